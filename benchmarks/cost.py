@@ -1,8 +1,10 @@
-"""What datasets cost: CPU seconds, bytes and files of a sequence, speed-up by workers.
+"""What datasets cost: CPU seconds, bytes and files of a sequence, speed-up by workers; what loops over episodes cost.
 
     python -m benchmarks.cost sequences [--entry merge queue pillar crowd] [--seeds 0:1] [--repeats 1]
         [--sequences 1000000] [--cores 1000]
     python -m benchmarks.cost workers [--entry crowd] [--seeds 0:32] [--set duration=4] [--rounds 3]
+    python -m benchmarks.cost loops [--tracker blob] [--rounds 3]
+    python -m benchmarks.cost memory [--tracker blob] [--frames 3000]
 
 sequences: every entry with every seed is made in this process, kernels warm, with several kinds of pictures. Columns,
 per sequence, each the best of --repeats runs: CPU seconds to make it (simulate, draw, encode, write), to check it (the
@@ -14,11 +16,21 @@ the largest process. CPU seconds and memory are those of all processes that work
 must be many. "By CPU time at most" is 2 CPU_1 / CPU_2, what two idle cores could give. Memory must not grow with the
 number of sequences: a quarter of the seeds is made, too. Exit code 1 below MUST times the speed, or above GROWTH times
 the memory.
+loops: a trial of 16 episodes, and a sweep of `flockscope stress` over 5 values of one axis of the sensor, each over the
+time that the tracker itself took in it, warm, the median of the rounds; 24 short sequences, made by one process and by
+two; the number of our modules that the shortest way from a scenario to scores loads. Exit code 1 beyond a limit.
+memory: `track` and `score` of a text of boxes of 5 people, of so many frames and of three times as many: kB of the
+largest process by which each further frame makes it greater.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
+import json
+import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Iterable, Iterator
@@ -32,6 +44,8 @@ from benchmarks.support.options import add_seeds, new_parser, seeds_text
 from benchmarks.support.tables import head, row
 from benchmarks.support.timing import machine_load
 from sim.dataset.generate import generate
+from tracking.app.cli import run as run_command
+from tracking.episodes.episode import SourceCache, play, sources
 from tracking.export.webdataset import webdataset
 from tracking.recordings.source import open_source
 
@@ -139,18 +153,122 @@ def workers(args: argparse.Namespace) -> int:
     return 0 if speed_up >= MUST and growth <= GROWTH else 1
 
 
+def episodes_ratio(tracker: str, rounds: int) -> float:
+    """Returns the time of a trial of 16 episodes over its tracking time, the median of the rounds."""
+    every, cache = sources("quick", range(4))[:16], SourceCache(2**30)
+    found = []
+    for _ in range(rounds + 1):
+        begun = time.perf_counter()
+        played = [play(tracker, source, detections="file", cache=cache) for source in every]
+        found.append((time.perf_counter() - begun) / sum(episode.seconds_tracking for episode in played))
+    return float(np.median(found[1:]))
+
+
+def stress_ratio(tracker: str, rounds: int) -> float:
+    """Returns the time of a sweep over its tracking time, the median of the rounds."""
+    suites = [word for name in ("merge", "queue") for word in ("--suite", name)]
+    found = []
+    for _ in range(rounds + 1):
+        with tempfile.TemporaryDirectory() as out, contextlib.redirect_stdout(io.StringIO()):
+            begun = time.perf_counter()
+            words = [
+                "stress",
+                tracker,
+                *suites,
+                "--vary",
+                "detection",
+                "--seeds",
+                "0:4",
+                "--episodes",
+                "40",
+                "--out",
+                out,
+            ]
+            assert run_command(words) == 0
+            spent = time.perf_counter() - begun
+            rows = [json.loads(line) for line in (Path(out) / "episodes.jsonl").read_text().splitlines()]
+        found.append(spent / sum(row["seconds"] for row in rows))
+    return float(np.median(found[1:]))
+
+
+SHORTEST = """
+import sys, sim, tracking
+from scenarios.loading.resolve import load
+sequence = sim.simulate(load("cross", ["duration=4"]), 0, streams=())
+tracking.evaluate(sequence.truth, tracking.track("blob", sequence, detections="file"))
+print(sum(name.partition(".")[0] in ("scenarios", "sim", "tracking") for name in sys.modules))
+"""
+
+
+def loops(args: argparse.Namespace) -> int:
+    run = GenerateRun(["crowd"], "0:24", more=["--set", "duration=4"], env=ONE_THREAD)
+    one, two = (np.min([way_cost(replace(run, workers=n), n) for _ in range(args.rounds)], axis=0) for n in (1, 2))
+    loaded = subprocess.run([sys.executable, "-c", SHORTEST], capture_output=True, text=True, check=True).stdout
+    rows = (
+        ("a trial of 16 episodes, over its tracking time", episodes_ratio(args.tracker, args.rounds), "at most", 1.15),
+        ("a sweep of stress, over its tracking time", stress_ratio(args.tracker, args.rounds), "at most", 1.3),
+        ("two workers on 24 short sequences, speed-up", one[0] / two[0], "at least", 1.6),
+        ("the same by CPU time at most", 2 * one[1] / two[1], "at least", 1.6),
+        ("modules loaded by the shortest way", float(loaded), "at most", 100),
+    )
+    print(machine_load())
+    head(["", "found", "limit"])
+    for name, value, side, limit in rows:
+        row([name, f"{value:.4g}", f"{side} {limit:g}"])
+    return int(any((value > limit) == (side == "at most") for _, value, side, limit in rows))
+
+
+def written_recording(folder: Path, frames: int) -> Path:
+    """Writes a folder of MOTChallenge with 5 labelled people, whose boxes are the detections, too; returns it."""
+    frame, person = (a.ravel() for a in np.meshgrid(np.arange(1, frames + 1), np.arange(1, 6), indexing="ij"))
+    left, top = 300 + 250 * np.sin(frame / 50 + person), 40.0 + 60 * person
+    columns = [frame, person, left, top, 30, 75, 1, -1, -1, -1]
+    rows = np.column_stack(np.broadcast_arrays(*columns))
+    for kind in ("gt", "det"):
+        (folder / kind).mkdir(parents=True)
+        np.savetxt(folder / kind / f"{kind}.txt", rows, "%g", delimiter=",")
+        rows[:, 1] = -1
+    text = f"[Sequence]\nname=made\nframeRate=10\nseqLength={frames}\nimWidth=640\nimHeight=480\n"
+    (folder / "seqinfo.ini").write_text(text)
+    return folder
+
+
+def memory(args: argparse.Namespace) -> int:
+    found = []
+    for frames in (args.frames, 3 * args.frames):
+        with tempfile.TemporaryDirectory() as name:
+            recording, tracks = written_recording(Path(name) / "made", frames), Path(name) / "tracks"
+            track = [args.tracker, str(recording), "--px-per-m", "40", "--out", str(tracks)]
+            found.append([largest_process(["track", *track]), largest_process(["score", str(recording), str(tracks)])])
+    head(["", "kB for each further frame"])
+    for name, few, many in zip(("track", "score"), *found, strict=True):
+        row([name, f"{(many - few) / (2 * args.frames):.1f}"])
+    return 0
+
+
+def largest_process(words: list[str]) -> int:
+    """Returns the kB of memory that a command takes at most."""
+    code = "import resource, sys; from tracking.app.cli import run; assert run(sys.argv[1:]) == 0\n"
+    code += "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=True)
+    return int(done.stderr.split()[-1])
+
+
 def main() -> int:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["sequences", "workers"])
+    parser.add_argument("mode", choices=["sequences", "workers", "loops", "memory"])
     parser.add_argument("--entry", nargs="+")
     add_seeds(parser, None, what="sequences 0:1, workers 0:32; ")
     parser.add_argument("--repeats", type=int, default=1, help="sequences: runs of which the best counts")
     parser.add_argument("--sequences", type=int, default=1_000_000, help="sequences: size of the planned dataset")
     parser.add_argument("--cores", type=int, default=1000, help="sequences: cores that make it")
     parser.add_argument("--set", nargs="*", default=[], metavar="KEY=VALUE", help="workers: settings of the scenarios")
-    parser.add_argument("--rounds", type=int, default=3, help="workers: rounds, both in turn")
+    parser.add_argument("--rounds", type=int, default=3, help="workers, loops: rounds, both in turn")
+    parser.add_argument("--tracker", default="blob", help="loops, memory: the tracker")
+    parser.add_argument("--frames", type=int, default=3000, help="memory: of the shorter recording")
     args = parser.parse_args()
-    return {"sequences": sequences, "workers": workers}[args.mode](args)
+    modes = {"sequences": sequences, "workers": workers, "loops": loops, "memory": memory}
+    return modes[args.mode](args)
 
 
 if __name__ == "__main__":

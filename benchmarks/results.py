@@ -36,7 +36,7 @@ from typing import Any
 
 from benchmarks.support.options import new_parser
 from sim.hashing import versions
-from sim.workers.pool import THREAD_VARIABLES
+from sim.workers.calls import THREAD_VARIABLES
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "docs" / "results"

@@ -21,7 +21,7 @@ from benchmarks.support.tables import INDICATIVE, difference_cell, head, mean_ce
 from scenarios.loading.resolve import resolve
 from sim.dataset.generate import generate
 from sim.sequence import simulate
-from sim.workers.pool import WorkerOptions
+from sim.workers.start import WorkerOptions
 from tracking.app.command_options import ScoreOptions, TrackOptions
 from tracking.app.commands.score import score
 from tracking.app.commands.track import track

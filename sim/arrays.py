@@ -40,6 +40,15 @@ class Frozen:
             elif isinstance(value, np.ndarray) and (value.dtype is not kind or value.flags.writeable):
                 object.__setattr__(self, name, _settled(value, kind))
 
+    @classmethod
+    def of_settled(cls, *values: Any) -> Self:
+        """Returns an object with these values of all fields, in order. Arrays must be read-only and have the declared
+        number type: this is not checked."""
+        made = object.__new__(cls)
+        for name, value in zip(_names(cls), values, strict=True):  # type: ignore[arg-type]
+            object.__setattr__(made, name, value)
+        return made
+
     def replace(self, **changes: Any) -> Self:
         """Returns a copy with the given fields changed."""
         made, names, kinds = object.__new__(type(self)), _names(type(self)), _array_fields(type(self))  # type: ignore[arg-type]
@@ -84,6 +93,12 @@ def _settled(a: NDArray[Any], kind: np.dtype[Any]) -> NDArray[Any]:
     if a.flags.writeable:
         a = a.view()
         a.flags.writeable = False
+    return a
+
+
+def read_only(a: NDArray[Any]) -> NDArray[Any]:
+    """Returns the array after it was made read-only; so are views that are made of it from now on."""
+    a.flags.writeable = False
     return a
 
 

@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sim.clock import check_stride, every_nth
-from sim.render.renderer import RenderedFrame, Renderer
 from sim.scene.camera import px_per_m_at_centre
 from sim.scene.camera_placement import place_camera
 from sim.streams import check_streams
@@ -29,6 +28,7 @@ from sim.types import (
 
 if TYPE_CHECKING:
     from scenarios.schema.scenario import ObservationSpec, Scenario
+    from sim.render.renderer import RenderedFrame, Renderer
 
 
 def simulate(
@@ -74,7 +74,11 @@ def observe(
     check_stride(stride, motion.fps)
     camera = place_camera(scenario.camera, motion)
     wanted = frozenset(check_streams(streams, "png"))
-    renderer = Renderer(motion, camera, scenario.light, scenario.picture) if wanted else None
+    renderer: Renderer | None = None
+    if wanted:
+        from sim.render import renderer as drawing
+
+        renderer = drawing.Renderer(motion, camera, scenario.light, scenario.picture)
     if renderer is not None and not wanted.isdisjoint({"right", "disparity"}):
         renderer.check_pair()
     left, right, disparity = ("left" in wanted, "right" in wanted, "disparity" in wanted)
@@ -106,9 +110,10 @@ def observe(
     # A frame's pixels are usually read right after its pictures.
     @lru_cache(maxsize=1)
     def drawn(index: int) -> RenderedFrame:
+        assert renderer is not None
         shot = 1 + (index - 1) * stride
-        if renderer is None or not left:
-            return RenderedFrame(right=renderer.right(shot) if renderer is not None and right else None)
+        if not left:
+            return drawing.RenderedFrame(right=renderer.right(shot) if right else None)
         return renderer.draw(shot, right=right, pixels=labels, disparity=disparity)
 
     def pixels(index: int) -> PixelTruth:
@@ -140,9 +145,10 @@ def observe(
     source |= {} if stride == 1 else {"stride": stride}
     source |= {} if renderer is None else {"background": OWN_BACKGROUND}
     return Sequence(
-        name=motion.name, fps=kept.fps, length=len(kept.present), frames=frames, load_truth=truth,
-        image_size=camera.image, camera=camera, scene=motion.scene, px_per_m=px_per_m_at_centre(camera),
-        has_images=left, has_right=right, has_detections=True, load_people=named, source=source, bare=bare,
+        name=motion.name, fps=kept.fps, length=len(kept.present), frames=bare if renderer is None else frames,
+        load_truth=truth, image_size=camera.image, camera=camera, scene=motion.scene,
+        px_per_m=px_per_m_at_centre(camera), has_images=left, has_right=right, has_detections=True,
+        load_people=named, source=source, bare=bare,
         load_owners=lambda: sensed()[1],
         load_background=None if renderer is None else background, load_pixels=None if renderer is None else pixels,
         load_light=light, never_arrive=motion.never_arrive,

@@ -11,7 +11,7 @@ false alarm is none of the oracle's. Detections of a recording are matched with 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from collections.abc import Sequence as SequenceOf
 from dataclasses import replace
 from itertools import pairwise
@@ -32,11 +32,15 @@ from sim.types import (
     Truth,
 )
 from tracking.grouping.grouped_tracks import groups_in_frames, with_velocities
-from tracking.running.detection_mode import as_frames, as_needed, choose_mode, given_detections
+from tracking.running.detection_mode import choose_mode
+from tracking.running.prepare import InputFrames, input_frames
 from tracking.running.run import TrackingRun
 from tracking.scoring.candidate_pairs import EPS, FOUND
 from tracking.scoring.evaluation import Scorer
 from tracking.scoring.people_comparison import Similarity
+
+# Returns the input of a sequence by mode, needs and seed.
+Inputs = Callable[[DetectionMode, tuple[str, ...], int], InputFrames]
 
 
 def _tracks(
@@ -47,15 +51,19 @@ def _tracks(
     return Tracks(index, t, plane, "person", *who, pos, vel, cov, box, score, Groups.none(), derived=True)
 
 
-def oracle(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity | None = None) -> TrackingRun:
+def oracle(
+    sequence: Sequence, given: Mapping[str, Any], similarity: Similarity | None = None, *,
+    inputs: Inputs | None = None, scorer: Scorer | None = None,
+) -> TrackingRun:  # fmt: skip
     """Returns the oracle's tracks of a sequence with truth.
 
     given: the content of a run's run.json, of which detections, input, sensor and seed say what input the oracle gets.
-    similarity: how detections are compared with true people; None: by the data. `info["owners"]` of the result is
-    "known", or "matched" if the data do not tell whose the detections are.
+    similarity: how detections are compared with true people; None: by the data. inputs, scorer: of the sequence, as
+    `prepare` takes it and of its truth, if they are made already. `info["owners"]` of the result is "known", or
+    "matched" if the data do not tell whose the detections are.
     """
     truth, mode = _truth(sequence), _mode(sequence, given)
-    named, known = _named(sequence, given, similarity)
+    named, known = _named(sequence, given, similarity, inputs, scorer)
     info = {"tracker": "oracle", "detections": mode, "sensor": given.get("sensor") or {}}
     people = [t.keep(t.id >= 0) for t in named]
     tracks = _with_groups_and_events(with_velocities(people, truth.fps), truth)
@@ -71,7 +79,10 @@ def named_detections(
     return _named(sequence, given, similarity)[0]
 
 
-def _named(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity | None) -> tuple[list[Tracks], bool]:
+def _named(
+    sequence: Sequence, given: Mapping[str, Any], similarity: Similarity | None, inputs: Inputs | None = None,
+    scorer: Scorer | None = None,
+) -> tuple[list[Tracks], bool]:  # fmt: skip
     truth, mode = _truth(sequence), _mode(sequence, given)
     if mode == "image":
         places = given.get("input") == "stereo"
@@ -79,13 +90,15 @@ def _named(sequence: Sequence, given: Mapping[str, Any], similarity: Similarity 
     seed = (given.get("seed") or 0) if given.get("sensor") else 0  # without errors it only shuffles the detections
     needs = ("boxes",) if given.get("input") == "boxes" else ("boxes", "points")
     choose_mode(needs, sequence, mode)
-    every = given_detections(mode, sequence, given.get("sensor") or {}, seed, owned=True)
-    seen = as_needed(every, needs, mode, sequence)
+    if inputs is None:
+        seen = input_frames(mode, needs, sequence, given.get("sensor") or {}, seed, owned=True)
+    else:
+        seen = inputs(mode, needs, seed)
     reported = [
         _tracks(f.index, f.t, d.plane, (np.arange(len(d.pos)), np.full(len(d.pos), -1)), d.pos, d.box, d.score)
-        for f in as_frames(seen.detections, sequence.fps)[: truth.length] if (d := f.detections) is not None
+        for f in (seen.frames or ())[: truth.length] if (d := f.detections) is not None
     ]  # fmt: skip
-    (compared,) = Scorer(truth).compare([reported], similarity, None)
+    (compared,) = (scorer or Scorer(truth)).compare([reported], similarity, None)
     sides, true, pairs = compared.sides, compared.sides.true, compared.people
     mapping = sides.mapping
     if seen.owners is not None and pairs is not None:

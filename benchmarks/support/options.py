@@ -6,7 +6,7 @@ import argparse
 import os
 from pathlib import Path
 
-from sim.workers.pool import THREAD_VARIABLES
+from sim.workers.calls import THREAD_VARIABLES
 
 SHARED_DATA = Path(__file__).resolve().parents[3] / "shared" / "data"
 PETS = "mot/PETS09-S2L1-first200"

@@ -24,7 +24,7 @@ from scenarios.errors import InputError
 from scenarios.limits import REPEATS
 from scenarios.loading import toml_files
 from scenarios.loading.checks import check
-from scenarios.loading.toml_files import CATALOGUE, SUITES, did_you_mean, dump, names, suite_names
+from scenarios.loading.toml_files import CATALOGUE, SUITES, Setting, did_you_mean, dump, names, suite_names
 from scenarios.loading.validation import validate
 from scenarios.schema.scenario import ObservationSpec, Scenario
 from scenarios.schema.sensor import Sensor
@@ -77,12 +77,12 @@ class Entry:
     file: str = field(default="", compare=False)
 
 
-def load(name_or_path: str | Path, set: Iterable[str] = ()) -> Scenario:
+def load(name_or_path: str | Path, set: Iterable[str | Setting] = ()) -> Scenario:
     """Loads and checks a scenario.
 
     Args:
         name_or_path: A name of the catalogue, or a TOML file, sought in the working folder and then in the catalogue.
-        set: Settings "key=value", applied in turn after `extends`.
+        set: Settings "key=value" or `Setting`, applied in turn after `extends`.
 
     Returns:
         The scenario with all defaults.
@@ -136,10 +136,10 @@ def read_suite(path: Path) -> Suite:
     return suite.model_copy(update={"entry": entries})
 
 
-def resolve(name: str, set: Iterable[str] = ()) -> list[Entry]:
+def resolve(name: str, set: Iterable[str | Setting] = ()) -> list[Entry]:
     """Returns the entries of a name in the catalogue, a *.toml file (scenario or suite), or `suite:NAME`.
 
-    set: settings "key=value", applied to each entry after the settings that the suite gives it.
+    set: settings, as of `load`, applied to each entry after the settings that the suite gives it.
     """
     settings, suite = tuple(set), suite_file(name)
     if suite is not None:
@@ -189,7 +189,7 @@ def suite_file(name: str) -> Path | None:
     raise InputError(got=repr(wanted), expected=expected, remedy=did_you_mean(wanted, known))
 
 
-def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
+def _entries(path: Path, settings: tuple[str | Setting, ...]) -> list[Entry]:
     loaded: dict[tuple[str, tuple[str, ...]], Scenario] = {}
     entries = []
     for entry in read_suite(path).entry:
@@ -207,7 +207,7 @@ def _entries(path: Path, settings: tuple[str, ...]) -> list[Entry]:
     return entries
 
 
-def _build(path: Path, settings: tuple[str, ...]) -> Scenario:
+def _build(path: Path, settings: tuple[str | Setting, ...]) -> Scenario:
     table, places = toml_files.apply_settings(toml_files.read(path), settings, path)
     scenario = validate(table, path, places, model=Scenario)
     check(scenario, path)

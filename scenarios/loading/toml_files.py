@@ -28,7 +28,7 @@ import os.path
 import re
 from collections.abc import Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from scenarios.errors import InputError, shortened
 from scenarios.limits import DEPTH, NESTING, TOML_BYTES
@@ -172,15 +172,28 @@ KeyPath = tuple[str | int, ...]
 SHOWN = 120  # characters of a setting that messages show
 
 
-def apply_settings(table: Table, settings: Iterable[str], file: object = "") -> tuple[Table, dict[KeyPath, str]]:
-    """Returns a copy of the table with each `key=value` applied, and the text of each setting by the path of its key.
+class Setting(NamedTuple):
+    """A key of a scenario, as "group.a.size", and its value; its text is `key=value`."""
+
+    key: str
+    value: Any
+
+    def __str__(self) -> str:
+        return f"{self.key}={toml_value(self.value)}"
+
+
+def apply_settings(
+    table: Table, settings: Iterable[str | Setting], file: object = ""
+) -> tuple[Table, dict[KeyPath, str]]:
+    """Returns a copy of the table with each setting applied, and the text of each setting by the path of its key.
 
     A misspelt key is not refused here but by `validate`. file: for messages.
     """
     table = copy.deepcopy(table)
     places: dict[KeyPath, str] = {}
-    for text in settings:
-        key, value = parse_setting(text)
+    for setting in settings:
+        text = str(setting)
+        key, value = parse_setting(text) if isinstance(setting, str) else (setting.key.split("."), setting.value)
         places[_put(table, key, value, text, file)] = text
     return table, places
 

@@ -91,11 +91,9 @@ class Distribution(Model):
         if self.choice is not None:
             return sum(low <= v <= high for v in self.choice) / len(self.choice)
         if self.poisson is not None:
-            from scipy.special import pdtr
-
-            ends = math.ceil(max(low, 0.0)) - 1, math.floor(min(high, 1e9))
-            low, high = (float(pdtr(k, self.poisson)) if k >= 0 else 0.0 for k in ends)
-            return high - low
+            mean, most = self.poisson, 20 * self.poisson + 100  # more has no probability that a float holds
+            counts = range(math.ceil(max(low, 0.0)), math.floor(min(high, most)) + 1)
+            return math.fsum(math.exp(k * math.log(mean) - mean - math.lgamma(k + 1)) for k in counts)
         if self.exponential is not None:
             return math.exp(-max(low, 0.0) / self.exponential) - math.exp(-max(high, 0.0) / self.exponential)
         if self.normal is not None:

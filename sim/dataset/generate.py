@@ -31,7 +31,7 @@ from sim.store.own_files import is_side_file, output_path, output_paths
 from sim.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest, reject_runs
 from sim.streams import check_streams
 from sim.types import Camera, Sequence
-from sim.workers.pool import WorkerOptions, start_workers
+from sim.workers.start import WorkerOptions, start_workers
 
 SHARED_DELAY = 5.0  # s that a shared file system may take to show one machine the file of another
 

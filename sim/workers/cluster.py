@@ -24,7 +24,7 @@ from typing import Any
 
 from scenarios.errors import InputError, WorkError
 from sim.hashing import runtime
-from sim.workers.pool import THREAD_VARIABLES, OnLoss, R, RunItems, T, WorkResult, run_pickled, worker_loss
+from sim.workers.calls import THREAD_VARIABLES, OnLoss, R, RunItems, T, WorkResult, run_pickled, worker_loss
 
 ADDRESS = r"[a-z]+://([^\s/:\[\]]+|\[[0-9a-fA-F:.]+\]):[0-9]+/?"
 SAME = "install the same on all (pip install -c constraints.txt) and restart the workers"

@@ -70,7 +70,7 @@ def _in_processes(
     source: OpenedAs,
     workers: int,
 ) -> Iterator[R]:
-    from sim.workers.pool import results_in_order, start_workers
+    from sim.workers.start import results_in_order, start_workers
 
     def lost(task: _Task, error: WorkError) -> _Outcome:
         return None, error.replaced(place=sequences[task[1]].name), []

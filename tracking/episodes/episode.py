@@ -111,8 +111,9 @@ class Rollout:
         self.opened: OpenedSource = open_source(self.source, streams)
         self.truth: Truth = self.opened.truth
         self.prepared = prepare(
-            self.tracker, self.sequence, params=self.config, detections=self.detections, seed=self.tracker_seed
-        )
+            self.tracker, self.sequence, params=self.config, detections=self.detections, seed=self.tracker_seed,
+            inputs=self.opened.input_frames,
+        )  # fmt: skip
         self.tracks: list[Tracks] = []
         start = time.perf_counter()
         self.prepared.reset(self.tracker_seed)
@@ -168,7 +169,7 @@ class Rollout:
         known, source = self.prepared.context, self.prepared.input
         tracks, _ = completed(
             self.tracks, known.fps, self.prepared.px_per_m(self.tracks), camera=known.camera, scene=known.scene,
-            source=source, image_size=known.image_size, all_events=every,
+            source=source, image_size=known.image_size, objective=not every,
         )  # fmt: skip
         try:
             run = TrackingRun(tracks, {"input": source})

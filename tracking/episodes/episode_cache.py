@@ -18,13 +18,15 @@ from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from scenarios.errors import InputError
-from sim.types import Frame, Sequence, Truth
+from sim.types import DetectionMode, Frame, Motion, Sequence, Truth
 
 if TYPE_CHECKING:
     from scenarios.loading.resolve import Entry
+    from scenarios.loading.toml_files import Setting
+    from tracking.running.prepare import InputFrames
     from tracking.scoring.evaluation import Scorer
 
 T = TypeVar("T")
@@ -57,22 +59,40 @@ class Source:
         """True if the sequence is simulated from a scenario, False if it is stored or in memory."""
         return self.entry is not None
 
-    def open(self, streams: Iterable[str] = ()) -> Sequence:
+    @cached_property
+    def people_key(self) -> tuple[object, ...]:
+        """A tuple that is equal for two sources exactly if they have the same people in motion, seen from one place."""
+        if self.entry is None:
+            return self.key
+        people = self.entry.scenario.model_dump_json(exclude={"sensor", "light", "picture"})
+        return self.name, self.seed, self.entry.repeat, people
+
+    def open(self, streams: Iterable[str] = (), motion: Motion | None = None) -> Sequence:
         """Returns the sequence: simulated, read from its path, or the one in memory. streams: the pictures to draw or
         read, some of "left", "right" and "background"; a stored sequence is read with pictures if "left" is among them.
+        motion: of the simulated people; None simulates it.
         """
         if self.sequence is not None:
             return self.sequence
         if self.entry is not None:
-            from sim.sequence import simulate
+            from sim.sequence import observe
 
-            return simulate(self.entry.scenario, self.seed, self.entry.repeat, streams)
+            return observe(self.entry.scenario, motion or self.motion(), streams=streams)
         from tracking.recordings.source import open_source
 
         return open_source(self.path, images="left" in streams)[0]
 
+    def motion(self) -> Motion:
+        """Returns the motion of the people of a simulated source."""
+        from sim.crowd.world import run
 
-def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: Iterable[str] = ()) -> tuple[Source, ...]:
+        assert self.entry is not None, "only a scenario is simulated"
+        return run(self.entry.scenario, self.seed, self.entry.repeat)
+
+
+def sources(
+    what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: Iterable[str | Setting] = ()
+) -> tuple[Source, ...]:
     """Returns the sources that `what` stands for; each scenario or suite entry gives one source per seed, in order.
 
     If a name is both in the catalogue and a folder, the catalogue is used.
@@ -81,7 +101,7 @@ def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: It
         what: The name of a suite or scenario, a TOML file, a folder, dataset or recording, a Sequence, a Source, or a
             list of these.
         seeds: Seeds with which scenarios are simulated; they have no effect on other sources.
-        set: Settings "key=value" of the scenarios.
+        set: Settings of the scenarios, as of `scenarios.load`.
 
     Raises:
         InputError: A name is unknown, a file or setting is wrong, there is no source, or there are settings but no
@@ -99,13 +119,13 @@ def sources(what: SourceSpec | Source, seeds: Iterable[int] = range(10), set: It
     if not found:
         raise InputError(place="sources", got="none", expected="at least one", remedy="give a suite, or seeds")
     if settings and not any(source.simulated for source in found):
-        got, remedy = ", ".join(settings), "leave the settings out"
+        got, remedy = ", ".join(map(str, settings)), "leave the settings out"
         raise InputError(place="set", got=got, expected="none for recordings", remedy=remedy)
     return found
 
 
 def _sources_of(
-    item: str | Path | Sequence | Source, seeds: tuple[int, ...], settings: tuple[str, ...]
+    item: str | Path | Sequence | Source, seeds: tuple[int, ...], settings: tuple[str | Setting, ...]
 ) -> list[Source]:
     if isinstance(item, Source):
         return [item]
@@ -129,17 +149,64 @@ def _stored(path: Path) -> list[Source]:
 DEFAULT_LIMIT = 256 * 2**20  # Bytes that a SourceCache keeps by default.
 
 
+class Kept:
+    """Values that are computed once and then kept. State: the values, and their bytes when these were last counted."""
+
+    def __init__(self) -> None:
+        self._values: list[object] = []
+        self._counted = (0, 0)  # number of values, bytes
+
+    def add(self, value: T) -> T:
+        """Keeps a value and returns it."""
+        self._values.append(value)
+        return value
+
+    def once(self, compute: Callable[[], T]) -> Callable[[], T]:
+        """Returns a function that returns what `compute` returns; it calls `compute` once."""
+        return cache(lambda: self.add(compute()))
+
+    @property
+    def bytes(self) -> int:
+        """Number of bytes that the values take, measured by pickling them."""
+        if len(self._values) != self._counted[0]:
+            arrays: list[pickle.PickleBuffer] = []
+            packed = pickle.dumps(self._values, protocol=5, buffer_callback=arrays.append)
+            self._counted = len(self._values), len(packed) + sum(array.raw().nbytes for array in arrays)
+        return self._counted[1]
+
+
+class SourcePeople:
+    """What sources of one `people_key` have in common: the motion, the truth and its scorer, kept after their first
+    use. motion: None if it is not simulated. load_truth: None without labels."""
+
+    def __init__(self, source: Source) -> None:
+        self.kept = Kept()
+        self.motion = self.kept.add(source.motion()) if source.simulated else None
+        self.load_truth: Callable[[], Truth] | None = None
+        self._scorer: Scorer | None = None
+
+    def scorer(self, truth: Truth) -> Scorer:
+        """Returns the `Scorer` of the truth, which is that of every such source."""
+        from tracking.scoring.evaluation import Scorer
+
+        if self._scorer is None:
+            self._scorer = self.kept.add(Scorer(truth))
+        return self._scorer
+
+
 class OpenedSource:
     """A source whose sequence is open; its detections, truth and background are kept after their first use. streams:
-    the pictures that are drawn if the source is simulated, some of "left", "right" and "background"."""
+    the pictures that are drawn if the source is simulated, some of "left", "right" and "background". people: of another
+    source with the same people_key."""
 
-    def __init__(self, source: Source, streams: tuple[str, ...] = ()) -> None:
-        self.source, self._kept = source, list[object]()
-        found = source.open(streams)
-        loads = {name: getattr(found, name) for name in ("load_truth", "load_background")}
-        once: dict[str, Any] = {name: self._computed_once(load) for name, load in loads.items() if load is not None}
-        self._opened = opened = replace(found, **once)
-        frames_once = self._computed_once(lambda: tuple(opened.without_pictures()))
+    def __init__(self, source: Source, streams: tuple[str, ...] = (), people: SourcePeople | None = None) -> None:
+        self.source, self.people, self.kept = source, people or SourcePeople(source), Kept()
+        found = source.open(streams, self.people.motion)
+        if self.people.load_truth is None and found.load_truth is not None:
+            self.people.load_truth = self.people.kept.once(found.load_truth)
+        background = found.load_background and self.kept.once(found.load_background)
+        self._opened = opened = replace(found, load_truth=self.people.load_truth, load_background=background)
+        frames_once = self.kept.once(lambda: tuple(opened.without_pictures()))
 
         def frames_without_pictures() -> Iterator[Frame]:
             return iter(frames_once())
@@ -147,14 +214,7 @@ class OpenedSource:
         pictures = opened.has_images or opened.has_right
         frames = opened.frames if pictures else frames_without_pictures
         self.sequence = replace(opened, bare=frames_without_pictures, frames=frames)
-
-    def _computed_once(self, compute: Callable[[], T]) -> Callable[[], T]:
-        @cache
-        def first_result() -> T:
-            self._kept.append(found := compute())
-            return found
-
-        return first_result
+        self._inputs: dict[tuple[object, ...], InputFrames] = {}
 
     @cached_property
     def truth(self) -> Truth:
@@ -165,20 +225,19 @@ class OpenedSource:
             raise InputError(file=self.source.name, got="no labels", expected="a truth", remedy=remedy)
         return truth
 
-    @cached_property
+    @property
     def scorer(self) -> Scorer:
         """A `Scorer` of the sequence's truth, built on first use. Raises InputError without labels."""
-        from tracking.scoring.evaluation import Scorer
+        return self.people.scorer(self.truth)
 
-        self._kept.append(scorer := Scorer(self.truth))
-        return scorer
+    def input_frames(self, mode: DetectionMode, needs: tuple[str, ...], seed: int) -> InputFrames:
+        """Returns what `tracking.running.prepare.input_frames` does, made on first use."""
+        from tracking.running.prepare import input_frames
 
-    @property
-    def bytes(self) -> int:
-        """Number of bytes that detections, truth, background and scorer take so far, measured by pickling them."""
-        arrays: list[pickle.PickleBuffer] = []
-        packed = pickle.dumps(self._kept, protocol=5, buffer_callback=arrays.append)
-        return len(packed) + sum(array.raw().nbytes for array in arrays)
+        key = (mode, "boxes" in needs, "points" in needs, seed if mode == "truth" else 0)
+        if key not in self._inputs:
+            self._inputs[key] = self.kept.add(input_frames(mode, needs, self.sequence, {}, seed, owned=True))
+        return self._inputs[key]
 
 
 class SourceCache:
@@ -191,29 +250,24 @@ class SourceCache:
     def __init__(self, limit: int = DEFAULT_LIMIT) -> None:
         self.limit = limit
         self._opened: OrderedDict[tuple[object, ...], OpenedSource] = OrderedDict()
-        self._bytes: dict[tuple[object, ...], int] = {}
 
     def __len__(self) -> int:
         return len(self._opened)
 
     @property
     def bytes(self) -> int:
-        """Number of bytes that all kept sources take, 0 without sources; only the last used one is measured anew."""
-        last = next(reversed(self._opened), None)
-        for key, opened in self._opened.items():
-            if key == last or key not in self._bytes:
-                self._bytes[key] = opened.bytes
-        return sum(self._bytes.values())
+        """Number of bytes that all kept sources take, 0 without sources."""
+        people = {id(opened.people): opened.people.kept for opened in self._opened.values()}
+        return sum(opened.kept.bytes for opened in self._opened.values()) + sum(kept.bytes for kept in people.values())
 
     def open(self, source: Source, streams: tuple[str, ...] = ()) -> OpenedSource:
         """Returns the opened source: the kept one if it was opened with the same `streams`, else a new one."""
         key = (*source.key, streams)
         if key not in self._opened:
-            held = self.bytes
-            while self._opened and held > self.limit:
-                dropped, _ = self._opened.popitem(last=False)
-                held -= self._bytes.pop(dropped)
-            self._opened[key] = OpenedSource(source, streams)
-        self._bytes.pop(key, None)  # it may come to hold more
+            while self._opened and self.bytes > self.limit:
+                self._opened.popitem(last=False)
+            others = (opened for opened in self._opened.values() if opened.source.people_key == source.people_key)
+            other = next(others, None)
+            self._opened[key] = OpenedSource(source, streams, None if other is None else other.people)
         self._opened.move_to_end(key)
         return self._opened[key]

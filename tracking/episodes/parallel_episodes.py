@@ -14,7 +14,7 @@ from typing import Any
 
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError
 from sim.types import DetectionMode, Tracker
-from sim.workers.pool import RunItems
+from sim.workers.calls import RunItems
 from tracking.episodes.episode import Episode, Source, SourceCache, play
 from tracking.episodes.tuned_tracker import RULE, TunedTracker
 from tracking.grouping.link_rule import LinkRule
@@ -55,7 +55,7 @@ def episode_player(
     """Context manager: opens the workers and yields the function play(sources, values, every_score) (`PlayEpisodes`).
     cluster: address of a dask scheduler, None for processes here. A class as tracker needs one worker here. note:
     called after each episode with what the tracker has used, as of `used_by`."""
-    from sim.workers.pool import results_in_order
+    from sim.workers.start import results_in_order
 
     if isinstance(tracker.tracker, type) and (workers > 1 or cluster):
         remedy = "give file.py:Class or module:Class, or one worker"
@@ -78,7 +78,7 @@ def episode_player(
 def playing_workers(workers: int = 1, cluster: str | None = None) -> Iterator[RunItems]:
     """Context manager: opens workers and yields the function that runs items on them. At the end this process closes
     the trackers and forgets the sequences that it kept for episodes."""
-    from sim.workers.pool import start_workers
+    from sim.workers.start import start_workers
 
     with start_workers(workers, cluster) as run:
         try:

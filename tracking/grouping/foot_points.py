@@ -17,7 +17,13 @@ import numpy as np
 from sim.scene.standing import standing_points
 from sim.types import Array, Bools, Camera, GroupEvent, Ints, Scene, Tracks
 from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
-from tracking.grouping.grouped_tracks import groups_in_frames, names_groups, with_groups, with_velocities
+from tracking.grouping.grouped_tracks import (
+    groups_in_frames,
+    labels_and_events,
+    names_groups,
+    with_groups,
+    with_velocities,
+)
 from tracking.grouping.grouping_choice import Grouping
 
 FLATTENED = 0.4  # k of `as_measured`: of 0 to 1, about the greatest F1 of groups and pairs from 5 to 60 degrees above.
@@ -87,44 +93,45 @@ def as_measured(pos: Array, camera: Camera) -> Array:
 
 def completed(
     tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None = None, *, camera: Camera | None,
-    scene: Scene | None, source: str | None = None, image_size: tuple[int, int] | None = None, all_events: bool = True,
+    scene: Scene | None, source: str | None = None, image_size: tuple[int, int] | None = None, objective: bool = False,
 ) -> tuple[tuple[Tracks, ...], Ground]:  # fmt: skip
     """Returns the tracks with groups and events filled in, and the ground that was used for them.
 
     If the ground under the boxes is known (`ground_below`), groups are derived from positions there, else as
     `with_groups` does. source: what the tracker worked on, an `InputKind`; None: unknown. image_size: width, height,
-    px; None: unknown. all_events: as of `derive`.
+    px; None: unknown. objective: as of `derive`.
     """
     if all(t.derived for t in tracks):
         return tuple(tracks), Ground()
     ground = ground_below(tracks, camera, px_per_m, source, image_size)
     if ground.camera is None:
-        return with_groups(tracks, fps, px_per_m, rule, all_events=all_events), ground
+        return with_groups(tracks, fps, px_per_m, rule, objective=objective), ground
     stairs = None if camera is None else scene  # the boxes tell no place in the scene
-    feet = standing(tracks, ground.camera, stairs) if plane_of_run(tracks) == "image" else tracks
-    there, named = depth_as_measured(feet, ground.camera), names_groups(tracks)
-    grouped = with_groups(there, fps, 1.0, rule, all_events=all_events)
-    out = [_grouped_as(t, g) for t, g in zip(with_velocities(tracks, fps), grouped, strict=True)]
-    pairs = zip(out, groups_in_frames(out), strict=True)
-    return tuple(t if named and t.groups is not None else t.replace(groups=g) for t, g in pairs), ground
+    in_image = plane_of_run(tracks) == "image"
+    feet = (
+        standing_points(_boxes(tracks), ground.camera, stairs) if in_image else np.concatenate([t.pos for t in tracks])
+    )
+    places = as_measured(feet, ground.camera)
+    _, labels, events = labels_and_events(tracks, fps, 1.0, rule, objective=objective, places=places)
+    named, moving = names_groups(tracks), with_velocities(tracks, fps)
+    shapes = groups_in_frames(moving, 1.0, labels, shapes=not objective)
+    return tuple(
+        t.replace(
+            group=label, events=(*t.events, *moved_events(new, t.id, t.pos)), derived=True,
+            groups=(t.groups if named else None) or groups,
+        ) for t, label, new, groups in zip(moving, labels, events, shapes, strict=True)
+    ), ground  # fmt: skip
 
 
-def depth_as_measured(tracks: Sequence[Tracks], camera: Camera) -> list[Tracks]:
-    """Returns tracks on the ground with positions `as_measured` and unknown (nan) velocities."""
-    return [t.replace(pos=as_measured(t.pos, camera), vel=np.full_like(t.vel, np.nan)) for t in tracks]
-
-
-def _grouped_as(t: Tracks, grouped: Tracks) -> Tracks:
-    new = moved_events(grouped.events[len(t.events) :], t.id, t.pos)
-    return t.replace(group=grouped.group, events=(*t.events, *new), derived=True)
+def _boxes(tracks: Sequence[Tracks]) -> Array:
+    return np.concatenate([np.zeros((0, 4)), *(t.box for t in tracks if t.box is not None)])
 
 
 def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> list[Tracks]:
     """Returns tracks of boxes in the image as tracks on the ground, at the points where the boxes stand. Velocities
     become nan. Groups that the tracker named are kept, with new shapes; other `groups` become None."""
-    boxes = [np.zeros((0, 4)) if t.box is None else t.box for t in tracks]
-    ground = standing_points(np.concatenate([np.zeros((0, 4)), *boxes]), camera, scene)
-    cuts = np.cumsum([0, *map(len, boxes)]).tolist()
+    ground = standing_points(_boxes(tracks), camera, scene)
+    cuts = np.cumsum([0, *(0 if t.box is None else len(t.box) for t in tracks)]).tolist()
     moved = [
         t.replace(
             plane="ground", pos=ground[a:b], vel=np.full((b - a, 2), np.nan),

@@ -30,7 +30,7 @@ from sim.truth.group_hulls import box_groups, groups_over_time
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.queue_detection import ADVANCE_TIME, BRIDGE_TIME, queues
 from sim.truth.velocities import chords
-from sim.types import EVENT_KINDS, GroupEvent, Groups, Tracks
+from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Tracks
 from tracking.grouping.group_events import TrackedMotion, events_of_labels
 from tracking.grouping.group_labels import label_people
 from tracking.grouping.grouping_choice import Grouping, default_grouping, find_groups
@@ -42,19 +42,19 @@ PORTION = 5_000  # Frames worked on together: bounds memory.
 
 
 def with_groups(
-    tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None = None, *, all_events: bool = True
+    tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None = None, *, objective: bool = False
 ) -> tuple[Tracks, ...]:
     """Returns the tracks of a sequence, one `Tracks` per frame, with groups, events and velocities filled in.
 
     px_per_m: image scale of tracks in the image; if it is nan for these, only velocities are filled in. rule: how
-    people are grouped; None takes the default grouping. all_events: as of `derive`.
+    people are grouped; None takes the default grouping. objective: as of `derive`.
     """
     if all(t.derived for t in tracks):
         return tuple(tracks)
     tracks = with_velocities(tracks, fps)
     if tracks[0].plane == "image" and not math.isfinite(px_per_m):
         return tuple(tracks)
-    return tuple(derive(tracks, fps, px_per_m, rule, all_events=all_events))
+    return tuple(derive(tracks, fps, px_per_m, rule, objective=objective))
 
 
 def with_velocities(tracks: Sequence[Tracks], fps: float) -> Sequence[Tracks]:
@@ -94,27 +94,47 @@ def without_groups(tracks: Sequence[Tracks]) -> list[Tracks]:
 
 def derive(
     tracks: Iterable[Tracks], fps: float, px_per_m: float = 1.0, rule: Grouping | None = None, *,
-    all_events: bool = True,
+    objective: bool = False,
 ) -> list[Tracks]:  # fmt: skip
     """Returns the tracks with `group`, `groups` and `events` filled in where the tracker left them empty.
 
     tracks: of a whole sequence, in order, one per frame from frame 1. If the tracker names groups in its first frame
     with people, its groups are kept; otherwise the grouping forms all groups, and any that the tracker reports later
     are removed. Events of a kind are derived for the frames before the tracker reports this kind itself.
-    all_events: False leaves out crossings and queues, which take a third of the time.
+    objective: True leaves out crossings, queues and hulls, which the objective does not need.
     """
     given = list(tracks)
     if not given or any(t.unit == "group" for t in given):
         return given
-    rule, named, own = rule or default_grouping(), names_groups(given), _own_events(given)
+    table, labels, events = labels_and_events(given, fps, px_per_m, rule, objective=objective)
+    named, shapes = names_groups(given), groups_in_frames(given, table.scale, labels, shapes=not objective)
+    nobody = Groups.none()
+    return [
+        t.replace(
+            group=label, events=(*t.events, *new), derived=True,
+            groups=(t.groups if named else None) or (groups if len(t.id) else nobody),
+        ) for t, label, new, groups in zip(given, labels, events, shapes, strict=True)
+    ]  # fmt: skip
+
+
+def labels_and_events(
+    tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None = None, *, objective: bool = False,
+    places: Array | None = None,
+) -> tuple[TracksTable, list[Ints], list[tuple[GroupEvent, ...]]]:  # fmt: skip
+    """Returns the table of people, and for each `Tracks` the group ids (N,) of its rows and the events to add.
+
+    The arguments are as in `derive`. places: as of `tabulate`; the events then lie there.
+    """
+    rule, named, own = rule or default_grouping(), names_groups(tracks), _own_events(tracks)
     if not named:
         # groups that appear later would change frames that are reported already
-        given = [t.replace(group=np.full(len(t.id), -1), groups=None) if _has_groups(t) else t for t in given]
-    table, events = tabulate(given, fps, px_per_m), list[GroupEvent]()
+        tracks = [t.replace(group=np.full(len(t.id), -1), groups=None) if _has_groups(t) else t for t in tracks]
+    table, events = tabulate(tracks, fps, px_per_m, places), list[GroupEvent]()
     if not named or own.get("merge", math.inf) > 1:
         table, events = _grouped(table, named, fps, rule)
-    events += _crossings_and_queues(table, fps) if all_events else []
-    return _filled(given, table, [e for e in events if (e.emitted or e.start) < own.get(e.kind, math.inf)])
+    events += [] if objective else _crossings_and_queues(table, fps)
+    events = [e for e in events if (e.emitted or e.start) < own.get(e.kind, math.inf)]
+    return table, *_of_frames(tracks, table, events)
 
 
 def _own_events(tracks: Sequence[Tracks]) -> dict[str, int]:
@@ -167,22 +187,19 @@ def events_at_end(reported: Sequence[Tracks], filled: Sequence[Tracks], fps: flo
     return sum(e.kind in after and e.end + after[e.kind] > last.index for e in last.events[own:])
 
 
-def _filled(given: Sequence[Tracks], table: TracksTable, events: Sequence[GroupEvent]) -> list[Tracks]:
-    cuts = np.searchsorted(table.frame, np.arange(table.length + 1))
+def _of_frames(
+    tracks: Sequence[Tracks], table: TracksTable, events: Sequence[GroupEvent]
+) -> tuple[list[Ints], list[tuple[GroupEvent, ...]]]:
+    cuts = np.searchsorted(table.frame, np.arange(table.length + 1)).tolist()
     by_frame: dict[int, list[GroupEvent]] = {}
     for event in events:
         by_frame.setdefault(event.emitted or event.start, []).append(_with_track_ids(event, table))
-    out, nobody = [], Groups.none()
-    for t in given:
-        new = tuple(sorted(by_frame.pop(t.index, ()), key=lambda e: (e.start, e.end, e.kind, e.members, e.after)))
-        if len(t.id):
-            r = slice(int(cuts[t.index - 1]), int(cuts[t.index]))
-            label = table.group[r][np.searchsorted(table.id[r], t.id)]
-            out.append(t.replace(group=label, events=(*t.events, *new), derived=True))
-        else:
-            out.append(t.replace(groups=t.groups or nobody, events=(*t.events, *new), derived=True))
-    groups = groups_in_frames(out, table.scale)
-    return [t.replace(groups=g) if t.groups is None else t for t, g in zip(out, groups, strict=True)]
+    labels = []
+    for t in tracks:
+        r = slice(cuts[t.index - 1], cuts[t.index])
+        labels.append(table.group[r][np.searchsorted(table.id[r], t.id)])
+    every = (by_frame.pop(t.index, ()) for t in tracks)
+    return labels, [tuple(sorted(new, key=lambda e: (e.start, e.end, e.kind, e.members, e.after))) for new in every]
 
 
 def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:
@@ -190,25 +207,29 @@ def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:
     return replace(event, members=tuple(int(table.ids[p - 1]) for p in event.members), pos=(x, y))
 
 
-def groups_in_frames(tracks: Sequence[Tracks], px_per_m: float = 1.0) -> list[Groups]:
-    """Returns the groups of each frame that follow from the group ids in `group`, one `Groups` per `Tracks`. Hulls
-    enclose the boxes of people in the image, else their footprints; px_per_m scales footprints in the image."""
-    portions = (tracks[low : low + PORTION] for low in range(0, len(tracks), PORTION))
-    return [groups for portion in portions for groups in _groups_of_portion(portion, px_per_m)]
+def groups_in_frames(
+    tracks: Sequence[Tracks], px_per_m: float = 1.0, labels: Sequence[Ints] | None = None, *, shapes: bool = True
+) -> list[Groups]:
+    """Returns the groups of each frame that follow from the group ids, one `Groups` per `Tracks`. Hulls enclose the
+    boxes of people in the image, else their footprints; px_per_m scales footprints in the image. labels: group ids (N,)
+    of each `Tracks`, None: its `group`. shapes: False leaves the hulls out."""
+    labels = [t.group for t in tracks] if labels is None else labels
+    portions = (slice(low, low + PORTION) for low in range(0, len(tracks), PORTION))
+    return [g for portion in portions for g in _groups_of_portion(tracks[portion], labels[portion], px_per_m, shapes)]
 
 
-def _groups_of_portion(tracks: Sequence[Tracks], px_per_m: float) -> list[Groups]:
+def _groups_of_portion(tracks: Sequence[Tracks], labels: Sequence[Ints], px_per_m: float, shapes: bool) -> list[Groups]:
     frame = np.repeat(np.arange(len(tracks)), [len(t.id) for t in tracks])
-    id, group = np.concatenate([t.id for t in tracks]), np.concatenate([t.group for t in tracks])
+    id, group = np.concatenate([t.id for t in tracks]), np.concatenate(labels)
     # of people in space x and y, as frames without groups have two coordinates, too
     pos, vel = np.concatenate([t.pos[:, :2] for t in tracks]), np.concatenate([t.vel[:, :2] for t in tracks])
     box = np.concatenate([
         np.full((len(t.id), 4), np.nan) if t.box is None or t.plane != "image" else t.box for t in tracks
     ])  # fmt: skip
     there, boxed = np.isfinite(pos).all(axis=1), np.isfinite(box[:, 0])
-    a, b = there & ~boxed, there & boxed
-    around = groups_over_time(frame[a], id[a], group[a], pos[a], vel[a], 0, len(tracks), px_per_m)
+    a, b, length = there & ~boxed, there & boxed, len(tracks)
+    around = groups_over_time(frame[a], id[a], group[a], pos[a], vel[a], 0, length, px_per_m, shapes=shapes)
     if not b.any():
         return around
-    in_boxes = box_groups(frame[b], id[b], group[b], pos[b], vel[b], box[b], 0, len(tracks))
+    in_boxes = box_groups(frame[b], id[b], group[b], pos[b], vel[b], box[b], 0, length, shapes=shapes)
     return [one if len(one.id) else other for one, other in zip(around, in_boxes, strict=True)]

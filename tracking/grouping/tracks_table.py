@@ -42,13 +42,14 @@ class TracksTable:
         return replace(self, pos=np.where(known[:, None], self.pos, np.nan)).motion()
 
 
-def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float) -> TracksTable:
+def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, places: Array | None = None) -> TracksTable:
     """Returns the table of a sequence's person tracks, one `Tracks` per frame, at least one.
 
-    Unknown velocities are replaced by mean velocities over the last 0.5 s. Raises InputError if the tracks are in the
+    Unknown velocities are replaced by mean velocities over the last 0.5 s. places (R, 2): points on the ground, m, in
+    place of the positions of all rows; velocities are then unknown. Raises InputError if the tracks are in the
     image and px_per_m is not a finite number above 0.
     """
-    scale = px_per_m if tracks[0].plane == "image" else 1.0
+    scale = px_per_m if tracks[0].plane == "image" and places is None else 1.0
     if not math.isfinite(scale) or scale <= 0:
         raise InputError(
             place="px_per_m", got=f"{scale}", expected="a number above 0", remedy="give --px-per-m: tracks are in px"
@@ -56,7 +57,10 @@ def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float) -> TracksTab
     count = [len(t.id) for t in tracks]
     frame = np.repeat(np.array([t.index for t in tracks], np.int64) - 1, count)
     id, group = np.concatenate([t.id for t in tracks]), np.concatenate(_named_groups(tracks))
-    pos, vel = (np.concatenate([getattr(t, name)[:, :2] for t in tracks]) / scale for name in ("pos", "vel"))
+    if places is None:
+        pos, vel = (np.concatenate([getattr(t, name)[:, :2] for t in tracks]) / scale for name in ("pos", "vel"))
+    else:
+        pos, vel = places, np.full_like(places, np.nan)
     seen = np.concatenate([t.measured for t in tracks])
     order = np.lexsort((id, frame))
     seen = seen[order]

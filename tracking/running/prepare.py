@@ -7,7 +7,7 @@ out. `tracking.running.run.track` is the loop over it. The environment drives a 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from collections.abc import Sequence as SequenceOf
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -20,7 +20,7 @@ import numpy as np
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.limits import INTEGER, JSON_BYTES
 from scenarios.reading import parse_json
-from sim.types import Context, DetectionMode, Frame, Sequence, Tracker, Tracks
+from sim.types import Context, DetectionMode, Frame, Ints, Sequence, Tracker, Tracks
 from tracking.config import Config
 from tracking.running import image_scale, tracker_registry
 from tracking.running.detection_mode import (
@@ -132,6 +132,28 @@ class PreparedTracker:
             raise (error if error.file else error.replaced(file=path)) from error.__cause__
 
 
+@dataclass(frozen=True, eq=False)
+class InputFrames:
+    """What a tracker gets of a sequence in one mode: the frames (None in the mode "image"), by frame the owners of the
+    detections (None if unknown), and the image scale."""
+
+    frames: tuple[Frame, ...] | None
+    owners: SequenceOf[Ints] | None
+    scale: ImageScale
+
+
+def input_frames(
+    mode: DetectionMode, needs: tuple[str, ...], sequence: Sequence, sensor: Mapping[str, Any], seed: int,
+    *, owned: bool = False,
+) -> InputFrames:  # fmt: skip
+    """Returns the frames with the detections of the mode "file" or "truth", as a tracker with these needs gets them.
+    The other arguments are as of `given_detections`."""
+    given = given_detections(mode, sequence, sensor, seed, owned=owned)
+    seen = as_needed(given, needs, mode, sequence)
+    scale = image_scale.of_sequence(sequence, given)
+    return InputFrames(as_frames(seen.detections, sequence.fps), seen.owners, scale)
+
+
 def prepare(
     tracker: str | type[Tracker] | Tracker | TimeLimited,
     sequence: Sequence,
@@ -140,8 +162,10 @@ def prepare(
     detections: DetectionMode | None = None,
     sensor: Mapping[str, Any] | None = None,
     seed: int = 0,
+    inputs: Callable[[DetectionMode, tuple[str, ...], int], InputFrames] | None = None,
 ) -> PreparedTracker:
-    """Returns the tracker with all that it needs for the sequence; the arguments are as in `tracking.track`. Raises
+    """Returns the tracker with all that it needs for the sequence; the arguments are as in `tracking.track`. inputs:
+    returns `input_frames` of this sequence without sensor settings, by mode, needs and seed; None makes them. Raises
     InputError if an argument is wrong or tracker and sequence do not fit."""
     if not isinstance(sequence, Sequence):
         remedy = "open it: tracking.recordings.source.open_source(path), or sim.simulate(scenario, seed)"
@@ -155,11 +179,13 @@ def prepare(
         remedy = "add --detections truth, or leave out the sensor settings"
         place, got = "--sensor, --set sensor", f"--detections {mode}"
         raise InputError(place=place, got=got, expected="--detections truth", remedy=remedy)
-    frames = given = None
-    if mode != "image":
-        given = given_detections(mode, sequence, sensor or {}, seed)
-        frames = as_frames(as_needed(given, instance.needs, mode, sequence).detections, sequence.fps)
-    scale = image_scale.of_sequence(sequence, given)
+    if mode == "image":
+        given = InputFrames(None, None, image_scale.of_sequence(sequence, None))
+    elif inputs is None:
+        given = input_frames(mode, instance.needs, sequence, sensor or {}, seed)
+    else:
+        given = inputs(mode, instance.needs, seed)
+    frames, scale = given.frames, given.scale
     background = sequence.background() if mode == "image" else None
     context = Context(sequence.fps, scale.px_per_m, sequence.camera, sequence.scene, sequence.image_size, background)
     return PreparedTracker(name, instance, config, context, mode, sequence, frames, scale.frames)

@@ -14,7 +14,8 @@ from typing import Any, Self
 from scenarios.errors import InputError
 from scenarios.limits import is_number
 from sim.types import Context, Detections, Frame, Tracker, Tracks
-from sim.workers.pool import RemoteTraceback, WorkerProcess
+from sim.workers.calls import RemoteTraceback
+from sim.workers.pool import WorkerProcess
 from tracking.config import Config
 from tracking.running import tracker_registry, used_files
 from tracking.running.image_scale import learned_by
@@ -64,8 +65,7 @@ class TimeLimited:
 
     def close(self) -> None:
         """Ends the process; if a tracker is made later, a new process is started."""
-        self._process.terminate()
-        self._process.join()
+        self._process.close()
 
     def make(self, config: Config | None) -> RemoteTracker:
         """Makes the tracker in the process with this config, and returns a `RemoteTracker` that calls it. config: None
@@ -81,11 +81,12 @@ class TimeLimited:
         px_per_m, and what is new of that which it has used. Raises TimeoutError if the limit is exceeded,
         ChildProcessError if the process has ended, or what the tracker raised.
         """
-        pipe = self._process.send(_call, (number, method, arguments, self.seconds + GRACE))
-        if method != "create" and not pipe.poll(self.seconds):
+        future = self._process.submit(_call, (number, method, arguments, self.seconds + GRACE))
+        try:
+            result = self._process.outcome(future, None if method == "create" else self.seconds)
+        except TimeoutError:
             self.close()
-            raise TimeoutError(f"no answer within {self.seconds:g} s (--step-timeout)")
-        result = self._process.receive()
+            raise TimeoutError(f"no answer within {self.seconds:g} s (--step-timeout)") from None
         if result is None:
             raise ChildProcessError(f"its process ended with {self._process.ended}")
         if isinstance(result.error, KeyboardInterrupt):  # the process ignores Ctrl-C: it is the tracker's own

@@ -9,12 +9,14 @@ pairs that share no row and no column are in one best matching together. A few p
 of a sequence, and scipy's `linear_sum_assignment` gets the rest, frame by frame.
 
 If the weight clearly exceeds the sum of both rivals, the pair is in *every* best matching. `match_as_table` settles
-only these pairs. It passes every frame with a pair left over to scipy as a whole, so that ties are broken as in
-TrackEval.
+only these pairs. The pairs that are left over in a frame have one best matching in nearly all frames. It is found in
+the small table of their rows and columns. Where several matchings are best, scipy gets the frame's whole table, so that
+ties are broken as in TrackEval.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from itertools import pairwise
 
 import numpy as np
@@ -34,13 +36,8 @@ def match(frame: Ints, i: Ints, j: Ints, weight: Array) -> Bools:
     occurs in one frame only. weight (K,): above 0.
     """
     chosen, left = _settle(i, j, weight, strict=False)
-    # Rows are sorted by frame: among those of the pairs that are left, those of a frame are neighbours.
-    row, column = numbered(i[left])[1], numbered(j[left])[1]
-    cuts = np.flatnonzero(np.diff(frame[left], prepend=-1, append=-1))
-    low, high = (of.reduceat(column, cuts[:-1]).tolist() for of in (np.minimum, np.maximum))
-    for (first, end), least, most in zip(pairwise(cuts.tolist()), low, high, strict=True):
-        part, a = left[first:end], row[first:end] - row[first]
-        chosen[part] = _solve(a, column[first:end] - least, (int(a[-1]) + 1, most - least + 1), weight[part])
+    for part, row, column, shape in _tables(frame, i, j, left):
+        chosen[part] = _solve(row, column, shape, weight[part])
     return chosen
 
 
@@ -48,19 +45,47 @@ def match_as_table(pairs: Pairs, weight: Array) -> Bools:
     """Returns which of the pairs are matched, (K,) bool: as `match`, but with ties broken as TrackEval does. weight
     (K,): above 0."""
     chosen, left = _settle(pairs.i, pairs.j, weight, strict=True)
-    frame = pairs.frame
-    tangled = np.unique(frame[left])
-    starts, ends = (np.searchsorted(frame, tangled, side=side).tolist() for side in ("left", "right"))
-    for start, end in zip(starts, ends, strict=True):
-        # the whole frame, as TrackEval's ties follow from its whole table
-        chosen[start:end] = solve_frame(pairs, start, end, weight[start:end])
+    for part, row, column, shape in _tables(pairs.frame, pairs.i, pairs.j, left):
+        found = _only_matching(row, column, shape, weight[part])
+        if found is None:
+            whole = slice(*np.searchsorted(pairs.frame, (pairs.frame[part[0]], pairs.frame[part[0]] + 1)))
+            chosen[whole] = solve_frame(pairs, whole, weight[whole])
+        else:
+            chosen[part] = found
     return chosen
 
 
-def solve_frame(pairs: Pairs, start: int, end: int, weight: Array) -> Bools:
-    """Returns which of the P pairs of one frame scipy's linear_sum_assignment matches, (P,) bool. start, end: the pairs
-    with indices start … end - 1 are all pairs of the frame. weight (P,): of these pairs."""
-    i, j = pairs.i[start:end], pairs.j[start:end]
+def _tables(frame: Ints, i: Ints, j: Ints, left: Ints) -> Iterator[tuple[Ints, Ints, Ints, tuple[int, int]]]:
+    """Yields of each frame the indices of its pairs that are left, and their rows and columns in a table of this shape
+    that has no others."""
+    # Rows are sorted by frame: among those of the pairs that are left, those of a frame are neighbours.
+    row, column = numbered(i[left])[1], numbered(j[left])[1]
+    cuts = np.flatnonzero(np.diff(frame[left], prepend=-1, append=-1))
+    low, high = (of.reduceat(column, cuts[:-1]).tolist() for of in (np.minimum, np.maximum))
+    for (first, end), least, most in zip(pairwise(cuts.tolist()), low, high, strict=True):
+        a = row[first:end] - row[first]
+        yield left[first:end], a, column[first:end] - least, (int(a[-1]) + 1, most - least + 1)
+
+
+def solve_rest(i: Ints, j: Ints, weight: Array) -> Bools | None:
+    """Returns which of P pairs are in their only best matching, (P,) bool; None if several are best. i, j (P,): rows of
+    both sides, weight (P,)."""
+    (rows, a), (columns, b) = numbered(i), numbered(j)
+    return _only_matching(a, b, (len(rows), len(columns)), weight)
+
+
+def _only_matching(row: Ints, column: Ints, shape: tuple[int, int], weight: Array) -> Bools | None:
+    found = _solve(row, column, shape, weight)
+    # A best matching whose pairs all lose a little is still found only if every other one is worse.
+    little = (CLEARLY - 1) * float(weight.max())
+    again = _solve(row, column, shape, weight - little * found)
+    return found if np.array_equal(found, again) else None
+
+
+def solve_frame(pairs: Pairs, whole: slice, weight: Array) -> Bools:
+    """Returns which of the P pairs of one frame scipy's linear_sum_assignment matches, (P,) bool. whole: the indices of
+    all pairs of the frame. weight (P,): of these pairs."""
+    i, j = pairs.i[whole], pairs.j[whole]
     frame = pairs.true.frame[i[0]]
     (top, bottom), (first, last) = (np.searchsorted(r.frame, (frame, frame + 1)) for r in (pairs.true, pairs.est))
     return _solve(i - top, j - first, (bottom - top, last - first), weight)

@@ -34,7 +34,7 @@ import numpy as np
 
 from sim.types import Array, Bools, Ints
 from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs
-from tracking.scoring.matching import match, match_as_table, solve_frame
+from tracking.scoring.matching import match, match_as_table, solve_frame, solve_rest
 from tracking.scoring.weighted_sums import FrameScores, WeightedScores, bin_sums, ratio
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
@@ -181,9 +181,12 @@ def follow(near: Pairs, turn: Ints) -> Bools:
             chosen[kept] = taken_i[i[kept]] = taken_j[j[kept]] = True
             places = places[~(taken_i[i[places]] | taken_j[j[places]])]
         if len(places) > 1:
-            start, end = np.searchsorted(frame, (frame[places[0]], frame[places[0]] + 1)).tolist()
-            weight = near.s[start:end] + BONUS * chosen[before[start:end]]
-            chosen[start:end] = solve_frame(near, start, end, weight)
+            found = solve_rest(i[places], j[places], near.s[places])
+            if found is not None:
+                chosen[places] = found
+                continue
+            whole = slice(*np.searchsorted(frame, (frame[places[0]], frame[places[0]] + 1)))
+            chosen[whole] = solve_frame(near, whole, near.s[whole] + BONUS * chosen[before[whole]])
         else:
             chosen[places] = True
     return chosen[:-1]

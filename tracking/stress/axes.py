@@ -40,11 +40,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenarios.errors import InputError
-from scenarios.loading.toml_files import did_you_mean
+from scenarios.loading.toml_files import Setting, did_you_mean
 from sim.types import Array, Bools
 from tracking.stats import FEWEST, joint_level, mean_interval
 
-Settings = Callable[[float], list[str]]  # value: the settings of a scenario, as for --set
+Settings = Callable[[float], list[Setting]]  # value: the settings of a scenario
 NEVER = np.inf
 NUMBER = re.compile(r"-?[0-9]+(\.[0-9]+)?")
 
@@ -75,16 +75,22 @@ class Axis:
         return float(round(value)) if self.whole else value
 
 
+def _number(value: float) -> float:
+    """Returns the value rounded to 10 digits, as an int if it is whole."""
+    rounded = float(f"{value:.10g}")
+    return int(rounded) if rounded.is_integer() else rounded
+
+
 def _key(key: str) -> Settings:
-    return lambda value: [f"{key}={value:.10g}"]
+    return lambda value: [Setting(key, _number(value))]
 
 
-def _noise(value: float) -> list[str]:
-    return [f"sensor.noise_m={0.05 * value:.10g}", f"sensor.box_noise.scale={value:.10g}"]
+def _noise(value: float) -> list[Setting]:
+    return [*_key("sensor.noise_m")(0.05 * value), *_key("sensor.box_noise.scale")(value)]
 
 
-def _speeds(value: float) -> list[str]:
-    return [f"crowd.free_speed={{ normal = [1.34, {value:.10g}], clip = [0.3, 2.6] }}"]
+def _speeds(value: float) -> list[Setting]:
+    return [Setting("crowd.free_speed", {"normal": [1.34, _number(value)], "clip": [0.3, 2.6]})]
 
 
 AXES = {

@@ -18,7 +18,7 @@ from typing import Any
 from scenarios.errors import FlockscopeError, InputError, WorkError, shortened
 from sim.store.atomic import write_file
 from sim.types import DetectionMode
-from sim.workers.pool import RemoteTraceback
+from sim.workers.calls import RemoteTraceback
 from tracking.episodes.episode import Episode, streams_for
 from tracking.episodes.episode_cache import OpenedSource, Source
 from tracking.episodes.parallel_episodes import EpisodeTask, opened_sources, play_task, playing_workers, used_by
@@ -71,7 +71,7 @@ def contender(name: str, step_timeout: float | None = None) -> TunedTracker:
 @contextmanager
 def scene_player(workers: int = 1, cluster: str | None = None) -> Iterator[PlayScenes]:
     """Context manager: opens the workers and yields the function that plays scenes on them (`PlayScenes`)."""
-    from sim.workers.pool import results_in_order
+    from sim.workers.start import results_in_order
 
     with playing_workers(workers, cluster) as run:
         yield lambda scenes: results_in_order(run, play_scene, scenes, _lost)
@@ -103,7 +103,8 @@ def play_oracle(task: OracleTask, opened: OpenedSource) -> Outcome:
     frames = () if mode == "image" else sequence.without_pictures()
     kind = input_kind(task.tracker.needs, mode, sequence, frames)
     try:
-        scores = opened.scorer.evaluate(oracle(sequence, {"detections": mode, "input": kind}))
+        given = {"detections": mode, "input": kind}
+        scores = opened.scorer.evaluate(oracle(sequence, given, inputs=opened.input_frames, scorer=opened.scorer))
     except FlockscopeError as error:
         return _outcome(error)
     return Outcome({key: value for key, value in scores.items() if value == value}, frames=sequence.length or 0)

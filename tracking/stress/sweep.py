@@ -30,11 +30,12 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError
+from scenarios.loading.toml_files import Setting
 from sim.hashing import runtime
 from sim.types import Array, DetectionMode
 from tracking.episodes.episode import streams_for
 from tracking.episodes.episode_cache import Source, sources
-from tracking.episodes.parallel_episodes import EpisodeTask
+from tracking.episodes.parallel_episodes import EpisodeTask, opened_sources
 from tracking.episodes.tuned_tracker import TunedTracker
 from tracking.running.detection_mode import input_kind
 from tracking.stress.axes import Axis, BreakingPoint, Frontier, breaking_point, frontier
@@ -64,9 +65,9 @@ class Plan:
     episodes: int | None = None  # budget
     minutes: float | None = None
 
-    def settings_at(self, values: Values) -> tuple[str, ...]:
-        """Returns the settings "key=value" of scenes at these values, one value for each axis."""
-        own = (text for axis, value in zip(self.axes, values, strict=True) for text in axis.settings(value))
+    def settings_at(self, values: Values) -> tuple[str | Setting, ...]:
+        """Returns the settings of scenes at these values, one value for each axis."""
+        own = (setting for axis, value in zip(self.axes, values, strict=True) for setting in axis.settings(value))
         return (*self.settings, *own)
 
 
@@ -192,7 +193,7 @@ class Sweep:
         for (scene, names), outcomes in zip(jobs, self.run_scenes(tasks), strict=True):
             for name, outcome in zip(names, outcomes, strict=True):
                 facts = {"tracker": name, "scenario": scene.source.name, "seed": scene.source.seed}
-                settings = list(self.plan.settings_at(scene.values))
+                settings = [*map(str, self.plan.settings_at(scene.values))]
                 self.store.add({"key": self._key(name, scene), **facts, "settings": settings, **asdict(outcome)})
                 if name in self.trackers:
                     count += 1
@@ -353,7 +354,7 @@ def generate_command(scenario: str, seed: int, settings: Iterable[str], out: str
 def _content(source: Source) -> bytes:
     from sim.hashing import canonical_hash
 
-    sequence = source.open(())
+    sequence = opened_sources().open(source).sequence
     truth = sequence.truth
     frames = [frame.detections for frame in sequence.without_pictures()]
     return canonical_hash((None if truth is None else truth.pos, sequence.fps, frames)).encode()

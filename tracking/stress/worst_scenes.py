@@ -146,8 +146,10 @@ def _drawn(plan: Plan, entries: Sequence[SuiteEntry], trial: optuna.Trial, seed:
     entry: SuiteEntry = entries[trial.params[SCENARIO]]
     # Four digits, so that the scene's command is short; what was drawn and what is played differ by less than 0.1 %.
     values = tuple(float(f"{axis.at(trial.params[axis.name]):.4g}") for axis in plan.axes)
-    settings = last_of_each_key((*entry.settings, *plan.settings_at(values)))
-    scenario = load(entry.scenario, settings).model_copy(update={"name": entry.name})
+    settings = last_of_each_key((*entry.settings, *map(str, plan.settings_at(values))))
+    scenario = load(entry.scenario, (*entry.settings, *plan.settings_at(values))).model_copy(
+        update={"name": entry.name}
+    )
     of_scene = int(np.random.default_rng([seed, trial.number]).choice(plan.seeds))
     source = Source(entry.name, of_scene, entry=Entry(entry.name, scenario))
     place = tuple(trial.params[axis.name] for axis in plan.axes)

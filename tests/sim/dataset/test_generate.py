@@ -12,7 +12,7 @@ from sim.dataset.splits import split_of
 from sim.store import atomic
 from sim.store.seal import with_hash
 from sim.store.validate import validate
-from sim.workers.pool import WorkerOptions
+from sim.workers.start import WorkerOptions
 from tests.fake_simulator import content, scenario
 from tests.processes import python
 from tests.small_disks import small_disk
@@ -31,7 +31,7 @@ from scenarios.loading.resolve import Entry
 from scenarios.schema.scenario import Scenario
 from sim.dataset.generate import generate
 from sim.store import atomic
-from sim.workers.pool import WorkerOptions
+from sim.workers.start import WorkerOptions
 
 if __name__ == "__main__":
     out, workers, kill_after = sys.argv[1], int(sys.argv[2]), int(sys.argv[3])

@@ -10,7 +10,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.dataset import generate as generating
 from sim.dataset.generate import generate
-from sim.workers.pool import WorkerOptions
+from sim.workers.start import WorkerOptions
 from tests.fake_simulator import content
 from tests.loopback import Loopback, loopback
 

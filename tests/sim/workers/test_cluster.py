@@ -11,7 +11,7 @@ import pytest
 
 from scenarios.errors import InputError, WorkError
 from sim.workers import cluster
-from sim.workers.pool import start_workers
+from sim.workers.start import start_workers
 from tests.errands import complain, fall, process, profiled, refuse, root_of
 from tests.loopback import Loopback, loopback
 

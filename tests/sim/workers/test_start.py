@@ -9,7 +9,9 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import WorkError
-from sim.workers.pool import MAX_LOSSES, THREAD_VARIABLES, process_pool, results_in_order, start_workers
+from sim.workers.calls import THREAD_VARIABLES
+from sim.workers.pool import MAX_LOSSES, process_pool
+from sim.workers.start import results_in_order, start_workers
 from tests.errands import complain, fall, fall_at_first, hide, process, root_of, told
 
 

@@ -27,7 +27,18 @@ def test_what_a_source_comes_to_hold_later_counts():
     cache = SourceCache()
     for source in SOURCES[:2]:
         cache.open(source)
-    assert cache.bytes < 1000
+    before = cache.bytes
     assert cache.open(SOURCES[0]).truth is not None
-    last = cache.open(SOURCES[1])
-    assert cache.bytes > last.bytes + 1000
+    assert cache.bytes > before + 1000
+
+
+def test_sources_that_differ_in_the_sensor_share_people_truth_and_scorer():
+    cache = SourceCache()
+    (source,) = sources("cross", [3], ["camera.fps=5", "duration=4"])
+    (hard,) = sources("cross", [3], ["camera.fps=5", "duration=4", "sensor.detect_prob=0.5"])
+    (other,) = sources("cross", [3], ["camera.fps=5", "duration=4", "crowd.spacing=1"])
+    first, second, third = (cache.open(each) for each in (source, hard, other))
+    assert first.scorer is second.scorer
+    assert first.scorer is not third.scorer
+    for each in (source, hard):
+        assert play("blob", each, cache=cache, every_score=True).scores == play("blob", each, every_score=True).scores

@@ -171,7 +171,7 @@ def test_values_of_an_axis() -> None:
     people = parse_axis("people=1:4")
     assert people.spread(5) == [1, 2, 3, 4]
     assert people.between(1, 2) is None
-    assert parse_axis("sensor.clutter_rate=0.0:4.0").settings(2.5) == ["sensor.clutter_rate=2.5"]
+    assert parse_axis("sensor.clutter_rate=0.0:4.0").settings(2.5) == [("sensor.clutter_rate", 2.5)]
 
 
 SMALL = ("duration=4", "group.a.size=2")

@@ -14,7 +14,7 @@ from tracking.app.progress import ProgressMeter
 def generate(options: GenerateOptions) -> CommandResult:
     """Stores one sequence for every named scenario or suite entry and every seed, all seeds of an entry together."""
     from sim.dataset.generate import generate as make
-    from sim.workers.pool import WorkerOptions
+    from sim.workers.start import WorkerOptions
 
     seeds = option_parsing.seeds(options.seeds)
     sensor = option_parsing.sensor_settings(options.sensor)

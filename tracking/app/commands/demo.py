@@ -118,7 +118,7 @@ def _jobs(out: Path, trackers: Iterable[str], folders: list[Path], rendered: Pat
 
 
 def _runs(jobs: Iterable[_TrackJob], count: int, workers: int) -> dict[_TrackJob, list[TrackingRun]]:
-    from sim.workers.pool import start_workers
+    from sim.workers.start import start_workers
 
     runs = {}
     with ProgressMeter("track", count) as meter, start_workers(workers) as run:
@@ -146,25 +146,23 @@ def _tracked(job: _TrackJob) -> list[TrackingRun]:
 def _compiled_ahead() -> Iterator[Callable[[Iterable[_TrackJob]], Iterator[_TrackJob]]]:
     """Compiles the kernels of QUICK_TRACKERS in another process; yields a function that yields jobs, each when those
     that it needs are compiled."""
+    from concurrent.futures import wait
+
     from sim.workers.pool import WorkerProcess
 
     # With one processor it would only take longer, as the process imports everything again.
-    worker, compiling = WorkerProcess(), list(QUICK_TRACKERS) if (os.cpu_count() or 1) > 1 else []
+    worker, ahead = WorkerProcess(), QUICK_TRACKERS if (os.cpu_count() or 1) > 1 else ()
 
     def compiled(jobs: Iterable[_TrackJob]) -> Iterator[_TrackJob]:
         for job in jobs:
-            while job.tracker in compiling:
-                del compiling[0]
-                worker.receive()
+            wait(compiling.get(job.tracker, ()))
             yield job
 
     try:
-        for tracker in compiling:
-            worker.send(_compile, tracker)
+        compiling = {tracker: [worker.submit(_compile, tracker)] for tracker in ahead}
         yield compiled
     finally:
-        worker.terminate()
-        worker.join()
+        worker.close()
 
 
 def _compile(tracker: str) -> None:

@@ -107,7 +107,7 @@ Departures from pixels only:
 
 from __future__ import annotations
 
-from typing import ClassVar, cast
+from typing import TYPE_CHECKING, ClassVar, cast
 
 import numpy as np
 
@@ -117,7 +117,9 @@ from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.track_management import TrackedEllipses, TrackedPeople
 from tracking.papers.blob.update_from_boxes import BoxUpdater
-from tracking.papers.blob.update_from_pixels import PixelUpdater
+
+if TYPE_CHECKING:
+    from tracking.papers.blob.update_from_pixels import PixelUpdater
 
 
 class Blob:
@@ -152,6 +154,8 @@ class Blob:
             self.people = TrackedPeople(c, dynamics, context)
             self.updater = BoxUpdater(c, self.people)
         else:
+            from tracking.papers.blob.update_from_pixels import PixelUpdater
+
             people = TrackedEllipses(c, dynamics, context)
             self.people, self.updater = people, PixelUpdater(c, people, context)
 
