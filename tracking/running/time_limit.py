@@ -6,10 +6,12 @@ outside. Contexts, frames and tracks pass through a pipe as pickles.
 
 from __future__ import annotations
 
+import faulthandler
 import itertools
-import signal
+import os
 import sys
-from typing import Any, Self
+from functools import cache
+from typing import Any, Self, TextIO
 
 from scenarios.errors import InputError
 from scenarios.limits import is_number
@@ -126,6 +128,11 @@ _sent = (-1, 0, 0)  # In the process: what was known when `used` was sent last.
 _made: dict[int, Tracker] = {}  # In the process: the tracker by its number; at most one.
 
 
+@cache
+def _nowhere() -> TextIO:
+    return open(os.devnull, "w")
+
+
 def _call(request: tuple[int, str, tuple[Any, ...], float]) -> Any:
     global _sent
     number, method, given, limit = request
@@ -140,12 +147,12 @@ def _call(request: tuple[int, str, tuple[Any, ...], float]) -> Any:
         return None
     if number not in _made:
         raise RuntimeError("the process of this tracker was started again since its reset")
-    signal.setitimer(signal.ITIMER_REAL, limit)  # without a handler this ends the process, also in compiled code
+    faulthandler.dump_traceback_later(limit, exit=True, file=_nowhere())  # ends the process, also in compiled code
     tracker = type(_made[number])
     try:
         with inside(owner_of(tracker.__module__)):
             result, learned = getattr(_made[number], method)(*given), learned_by(_made[number])
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        faulthandler.cancel_dump_traceback_later()
     before, _sent = _sent, (number, len(sys.modules), used_files.opened())
     return result, learned, {} if _sent == before else used_files.used(tracker)

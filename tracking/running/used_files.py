@@ -35,12 +35,11 @@ INSTALLED = "packages"  # name of the fingerprint of all installed packages
 OURS = Path(__file__).resolve().parents[2]
 NOT_USERS = {"site-packages", "dist-packages", "__pycache__"}  # names of folders
 SYSTEM = ("/dev/", "/proc/", "/sys/")
-READS = ("open", "os.listdir", "os.scandir", "ctypes.dlopen")  # audit events of a file or folder that is read
+READS = {"open", "os.listdir", "os.scandir", "ctypes.dlopen"}  # audit events of a file or folder that is read
 IMPORT = "<frozen importlib._bootstrap_external>"  # file of the code that lists folders in which modules are
 THIS_PROCESS = secrets.token_hex(6)
 
 _owner = ""  # whose code is running; "": this project's
-_home = ""  # working folder of the command, while a tracker is in another one
 _opened: set[str] = set()  # absolute paths that it has opened or listed since it began
 _written: set[str] = set()  # that any tracker has written
 _files: dict[str, dict[str, str]] = {}  # by owner: fingerprints of what was opened, here and in its other processes
@@ -84,22 +83,21 @@ def load(file: Path) -> ModuleType:
 def inside(owner: str) -> Iterator[None]:
     """Stands around code of this owner: notes the files that it opens, and keeps its working folder apart from that of
     the command. It has no effect for "", this project's code, and inside another such block."""
-    global _owner, _home, _times
+    global _owner, _times
     if not owner or _owner:
         yield
         return
     _listen()
-    _owner = owner
+    _owner, home = owner, _working_folder()
     try:
         if owner in _folders:
             os.chdir(_folders[owner])
         yield
     finally:
         _owner = ""
-        if _home:
+        if _working_folder() != home:
             _folders[owner] = _working_folder()
-            os.chdir(_home)
-            _home = ""
+            os.chdir(home)
         user_modules.forget_aliases()
         if _opened:
             _times += 1
@@ -119,13 +117,9 @@ def _working_folder() -> str:
 
 
 def _hook(event: str, arguments: tuple[Any, ...]) -> None:
-    global _home
-    if not _owner or event not in (*READS, "os.chdir"):
+    if not _owner or event not in READS:
         return
     with suppress(Exception):  # an exception here would be one of open()
-        if event == "os.chdir":
-            _home = _home or _working_folder()
-            return
         path = os.path.abspath(os.fsdecode(arguments[0] or "."))
         if event == "open" and arguments[2] & (os.O_WRONLY | os.O_CREAT | os.O_TRUNC):
             _written.add(path)
