@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-import json
-import os
 import re
-import subprocess
-import sys
+import shutil
 from collections.abc import Callable
+from functools import cache
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tracking
+from sim import hashing
 from tests.refusals import answer
 from tests.tuning_toys import write_scenes
 from tracking.app.cli import run
@@ -133,47 +133,31 @@ def test_files_that_the_tracker_writes_do_not_count(folder: Path, capsys) -> Non
     assert [stress(capsys)[0], stress(capsys)[0]] == [0, 2]
 
 
-@pytest.mark.parametrize("what", ["sources", "numpy", "packages"])
-def test_other_sources_or_libraries(folder: Path, capsys, monkeypatch, what: str) -> None:
+def test_other_packages(folder: Path, capsys, monkeypatch) -> None:
     assert [stress(capsys)[0], stress(capsys)[0]] == [0, 2]
-    if what == "packages":
-        monkeypatch.setattr(used_files, "packages_hash", lambda: "another")
-    else:
-        from sim.hashing import runtime
-
-        monkeypatch.setattr("tracking.stress.sweep.runtime", lambda: {**runtime(), what: "another"})
+    monkeypatch.setattr(used_files, "packages_hash", lambda: "another")
     assert stress(capsys)[0] == 0
 
 
-def test_a_constant_of_the_scorer_and_the_version_of_numpy_in_a_copy(tmp_path: Path) -> None:
-    """A process of its own, with a copy of the sources, and one with a numpy that has another version."""
-    from shutil import copytree, ignore_patterns
+def test_a_constant_of_the_scorer_and_the_version_of_numpy_in_a_copy(folder: Path, capsys, monkeypatch) -> None:
+    """With hashes of a copy of the sources."""
+    for name in hashing.PACKAGES:
+        source = Path(hashing.__file__).parents[1] / name
+        shutil.copytree(source, folder / "copy" / name, ignore=shutil.ignore_patterns("__pycache__"))
+    constants = folder / "copy" / "tracking" / "scoring" / "people_comparison.py"
+    monkeypatch.setattr(hashing, "__file__", str(folder / "copy" / "sim" / "hashing.py"))
+    monkeypatch.setattr(hashing, "versions", hashing.versions.__wrapped__)
 
-    root = Path(tracking.__file__).parents[1]
-    for name in ("scenarios", "sim", "tracking", "tests"):
-        copytree(root / name, tmp_path / name, ignore=ignore_patterns("__pycache__"))
-    write_scenes(tmp_path)
-
-    def taken(*before: str) -> int:
-        code = "\n".join([*before, "from tracking.app.cli import main", "main()"])
-        line = ["stress", "blob", "--suite", "one.toml", "--seeds", "0:2", "--start", "2", "--out", "o", "--json"]
-        env = {**os.environ, "PYTHONPATH": str(tmp_path)}
-        done = subprocess.run(
-            [sys.executable, "-c", code, *line], cwd=tmp_path, env=env, capture_output=True, text=True
-        )
-        assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout)["taken_over"]["episodes"]
+    def taken() -> int:
+        monkeypatch.setattr("tracking.stress.sweep.runtime", cache(hashing.runtime.__wrapped__))
+        return stress(capsys)[0]
 
     assert [taken(), taken()] == [0, 2]
-    constants = tmp_path / "tracking" / "scoring" / "people_comparison.py"
     constants.write_text(constants.read_text() + "\n# another constant\n")
     assert [taken(), taken()] == [0, 2]
-    other = (
-        "import importlib.metadata as m",
-        "v = m.version",
-        "m.version = lambda n: '2.0.99' if n == 'numpy' else v(n)",
-    )
-    assert [taken(*other), taken(*other), taken()] == [0, 2, 2]
+    version = metadata.version
+    monkeypatch.setattr(metadata, "version", lambda name: "2.0.99" if name == "numpy" else version(name))
+    assert [taken(), taken()] == [0, 2]
 
 
 TUNE = (
