@@ -21,6 +21,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.machinery import ModuleSpec
+from importlib.util import source_from_cache
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
@@ -121,6 +122,8 @@ def _hook(event: str, arguments: tuple[Any, ...]) -> None:
         return
     with suppress(Exception):  # an exception here would be one of open()
         path = os.path.abspath(os.fsdecode(arguments[0] or "."))
+        if path.endswith(".pyc"):
+            path = source_from_cache(path)
         if event == "open" and arguments[2] & (os.O_WRONLY | os.O_CREAT | os.O_TRUNC):
             _written.add(path)
         elif event != "os.listdir" or sys._getframe(1).f_code.co_filename != IMPORT:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+import sys
 from collections.abc import Callable
 from functools import cache
 from importlib import metadata
@@ -106,6 +107,25 @@ def test_the_guides_tracker_whose_base_class_is_broken_has_another_score(folder:
     assert taken == 0
     assert broken[0] < good[0] / 2
     assert (taken, broken) == (0, stress(capsys, "--fresh")[1])
+
+
+def test_a_package_in_another_folder_has_episodes_of_its_own(folder: Path, capsys, monkeypatch) -> None:
+    """As two checkouts have, one of which is on the path: the files of the first are unchanged."""
+    nearest = (folder / "own" / "nearest.py").read_text()
+    found = []
+    for number in "1212":
+        package = folder / number / "wT_pkg"
+        package.mkdir(parents=True, exist_ok=True)
+        (package / "mine.py").write_text("from . import helper\n" + nearest)
+        (package / "helper.py").write_text(f"x = {number}")
+        with monkeypatch.context() as patch:
+            patch.syspath_prepend(folder / number)
+            for module in ("wT_pkg", "wT_pkg.mine", "wT_pkg.helper"):
+                patch.setitem(sys.modules, module, None)
+                del sys.modules[module]
+            line = ["stress", "wT_pkg.mine:Nearest", "--suite", "one.toml", "--seeds", "0:2", "--start", "2"]
+            found.append(answer(capsys, *line, "--by", "HOTA", "--out", "o")["taken_over"]["episodes"])
+    assert found == [0, 0, 2, 2]
 
 
 def test_a_file_that_was_missing(folder: Path, capsys) -> None:
