@@ -20,7 +20,7 @@ from scenarios.errors import WorkError
 from tracking.app.command_result import print_error
 
 CLASS = re.compile(r"(?:.*=)?(.*\.py|[A-Za-z_][\w.]*):[A-Za-z_]\w*")  # file.py:Class, module:Class
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))  # Windows has no SIGHUP
 
 
 def user_trackers(arguments: Sequence[str]) -> list[str]:
@@ -34,7 +34,8 @@ def watched(trackers: Sequence[str], as_json: bool) -> Callable[[], object]:
     names, for the message.
 
     The parent process does not return. It exits with the child's exit code, or with an error line and 1 if the child
-    ended otherwise. On systems without sigwaitinfo there is no child.
+    ended otherwise. On systems without sigwaitinfo (macOS, Windows) there is
+    no child, and such an end is not noticed.
     """
     if not hasattr(signal, "sigwaitinfo"):
         return lambda: None

@@ -8,10 +8,7 @@ from __future__ import annotations
 
 import faulthandler
 import itertools
-import os
-import sys
-from functools import cache
-from typing import Any, Self, TextIO
+from typing import Any, Self
 
 from scenarios.errors import InputError
 from scenarios.limits import is_number
@@ -124,13 +121,8 @@ class RemoteTracker:
         return result
 
 
-_sent = (-1, 0, 0)  # In the process: what was known when `used` was sent last.
+_sent = (-1, 0)  # In the process: what was known when `used` was sent last.
 _made: dict[int, Tracker] = {}  # In the process: the tracker by its number; at most one.
-
-
-@cache
-def _nowhere() -> TextIO:
-    return open(os.devnull, "w")
 
 
 def _call(request: tuple[int, str, tuple[Any, ...], float]) -> Any:
@@ -147,12 +139,12 @@ def _call(request: tuple[int, str, tuple[Any, ...], float]) -> Any:
         return None
     if number not in _made:
         raise RuntimeError("the process of this tracker was started again since its reset")
-    faulthandler.dump_traceback_later(limit, exit=True, file=_nowhere())  # ends the process, also in compiled code
+    faulthandler.dump_traceback_later(limit, exit=True)  # ends the process, also in compiled code
     tracker = type(_made[number])
     try:
         with inside(owner_of(tracker.__module__)):
             result, learned = getattr(_made[number], method)(*given), learned_by(_made[number])
     finally:
         faulthandler.cancel_dump_traceback_later()
-    before, _sent = _sent, (number, len(sys.modules), used_files.opened())
+    before, _sent = _sent, (number, used_files.opened())
     return result, learned, {} if _sent == before else used_files.used(tracker)

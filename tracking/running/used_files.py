@@ -10,7 +10,9 @@ Files that a compiled library opens itself are known if the tracker's code names
 
 from __future__ import annotations
 
+import ast
 import hashlib
+import importlib
 import os
 import secrets
 import sys
@@ -23,7 +25,7 @@ from functools import cache
 from importlib.machinery import ModuleSpec
 from importlib.util import source_from_cache
 from pathlib import Path
-from types import CodeType, ModuleType
+from types import ModuleType
 from typing import Any
 
 from scenarios.errors import InputError
@@ -73,7 +75,7 @@ def load(file: Path) -> ModuleType:
     if not package or changes(user_modules.packages[package].files):
         package, module = user_modules.new_package(file)
         with inside(package):
-            user_modules.load(package, module)
+            importlib.import_module(module)
         own = user_modules.packages[package]
         own.code = canonical_hash(relative(own.files, own.folder))[:12]
         _latest[file] = package, module
@@ -218,27 +220,20 @@ def _module(name: str) -> _Module | None:
     if name not in _modules or _modules[name].spec is not spec:
         path, named = os.path.abspath(file), set[str]()
         with suppress(Exception):  # a compiled module has no code
-            named = {*_named(compile(Path(path).read_bytes(), path, "exec"), os.path.dirname(path))}
+            named = {*_named(ast.parse(Path(path).read_bytes()), os.path.dirname(path))}
         _modules[name] = _Module(spec, path, fingerprint(path), frozenset(named))
     return _modules[name]
 
 
-def _named(code: CodeType, folder: str) -> Iterator[str]:
+def _named(code: ast.Module, folder: str) -> Iterator[str]:
     """Yields the paths of files that strings in the code name: in the working folder, in this folder, or below it in
     one that another string names."""
-    words = {*_strings_of(code)}
+    words = {node.value for node in ast.walk(code) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    words |= {word.lstrip(os.sep) for word in words}  # of f"{folder}/name"
     for place in (_working_folder(), folder, *(os.path.join(folder, word) for word in words if "." not in word)):
         if os.path.isdir(place):
             paths = (os.path.abspath(os.path.join(place, word)) for word in words if "." in word)
             yield from (path for path in paths if os.path.isfile(path) and is_users(path))
-
-
-def _strings_of(code: CodeType) -> Iterator[str]:
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from _strings_of(constant)
-        elif isinstance(constant, str):
-            yield constant
 
 
 @cache

@@ -54,24 +54,12 @@ def package_of(module: str) -> str:
 
 
 def new_package(file: Path) -> tuple[str, str]:
-    """Returns names of a package that is not loaded, and of its module, for a tracker's file at an absolute path. They
-    are the same in every process, for pickles and numba's cache, and the same for all files of a folder."""
+    """Returns the names of a new package, and of its module for a tracker's file at an absolute path. They are the same
+    in every process, for pickles and numba's cache, and the package's is the same for all files of a folder."""
     name = PREFIX + os.fsencode(file.parent).hex()
     while name in packages:
         name += "x"
     return name, f"{name}.{file.stem.replace('.', DOT)}"
-
-
-def load(package: str, module: str) -> None:
-    """Executes a module of a private package. If that fails, nothing of the package stays loaded."""
-    try:
-        importlib.import_module(module)
-    except BaseException:
-        _places.cache_clear()  # a missing neighbour may be put there
-        for loaded in [name for name in sys.modules if package_of(name) == package]:
-            del sys.modules[loaded]
-        packages.pop(package, None)
-        raise
 
 
 class _Loader(SourceFileLoader):
