@@ -19,6 +19,7 @@ from contextlib import contextmanager
 from types import FrameType
 
 from scenarios.errors import FlockscopeError, WorkError
+from tracking.running.user_modules import PRIVATE
 
 _received = threading.Event()
 
@@ -84,7 +85,7 @@ def what_was_raised(error: BaseException) -> str:
         text = str(error)
     except BaseException as failed:
         text = f"a message that cannot be read: its __str__ raises {type(failed).__name__}"
-    return f"{type(error).__name__}: {text}".partition("\n")[0]
+    return f"{type(error).__name__}: {PRIVATE.sub('', text)}".partition("\n")[0]
 
 
 def tracker_failed(tracker: str, method: str, place: str, error: BaseException) -> WorkError:

@@ -13,6 +13,7 @@ import builtins
 import importlib
 import importlib.util
 import os
+import re
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -27,6 +28,7 @@ from sim.hashing import PACKAGES, file_hash
 
 __path__: list[str] = []  # so that this module can have submodules
 PREFIX = f"{__name__}."
+PRIVATE = re.compile(re.escape(PREFIX) + r"[0-9a-f]+x*\.")  # what stands before a neighbour's own name
 DOT = "\u2024"  # stands for a dot in the name of a file, as in tracker.v2.py
 
 
@@ -160,7 +162,9 @@ def _installed(name: str, folder: str) -> bool:
     except (ImportError, ValueError):  # it has no spec, such as __main__
         return False
     own = {os.path.join(folder, place) for place in (name, f"{name}.py", f"{name}/__init__.py")}
-    return spec is not None and own.isdisjoint({spec.origin, *(spec.submodule_search_locations or ())})
+    if spec is None or isinstance(spec.loader, _Alias):
+        return False
+    return own.isdisjoint({spec.origin, *(spec.submodule_search_locations or ())})
 
 
 def _import(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import queue
+import re
 import subprocess
 import sys
 import types
@@ -77,6 +78,15 @@ def test_a_name_that_both_lack_is_an_error_that_names_both_files(tmp_path: Path)
     spec = write(tmp_path, "from tracking import nothing", "0", tracking=OWN)
     with pytest.raises(InputError, match=rf"{tmp_path}/tracking.py nor .*init__.py has 'nothing'"):
         find(spec)
+
+
+WRONG = {"from helper import no": "from 'helper' (", "import helper.no": "'helper.no'"}
+
+
+@pytest.mark.parametrize(("imports", "words"), WRONG.items())
+def test_errors_have_the_names_that_the_user_gave(tmp_path: Path, imports: str, words: str) -> None:
+    with pytest.raises(InputError, match=re.escape(words)):
+        find(write(tmp_path, imports, "0", helper=""))
 
 
 def test_a_file_may_have_the_name_of_one_of_our_packages(tmp_path: Path) -> None:
