@@ -19,7 +19,6 @@ from contextlib import contextmanager
 from types import FrameType
 
 from scenarios.errors import FlockscopeError, WorkError
-from tracking.running.user_modules import PRIVATE
 
 _received = threading.Event()
 
@@ -81,6 +80,8 @@ def user_code(
 
 def what_was_raised(error: BaseException) -> str:
     """Returns the type of an exception and the first line of its message, such as "SystemExit: 0"."""
+    from tracking.running.user_modules import PRIVATE
+
     try:
         text = str(error)
     except BaseException as failed:

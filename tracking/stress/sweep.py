@@ -225,10 +225,7 @@ class Sweep:
 
     def _key(self, name: str, scene: Scene) -> str:
         tracker = self.trackers.get(name)
-        if tracker is None:
-            own: tuple[object, ...] = self._of_oracle(name).needs
-        else:
-            own = (str(tracker.tracker), tracker.folder, tracker.code, tracker.step_timeout)
+        own = str(tracker) if tracker else self._of_oracle(name).needs
         facts = [runtime(), name, own, self.plan.detections, *map(str, scene.source.key)]
         return hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:24]
 

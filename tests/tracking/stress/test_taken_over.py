@@ -135,16 +135,6 @@ def test_a_file_that_was_missing(folder: Path, capsys) -> None:
     assert stress(capsys)[0] == 0
 
 
-def test_a_file_that_a_compiled_library_opens(folder: Path, capsys) -> None:
-    """OpenCV opens it without Python; its name stands in the code."""
-    (folder / "own" / "gain.yml").write_text("%YAML:1.0\n---\ngain: 2\n")
-    text = "\nimport cv2, os\ncv2.FileStorage(os.path.join(os.path.dirname(__file__), 'gain.yml'), 0)\n"
-    appended("own/lazy.py", text)(folder)
-    assert [stress(capsys)[0], stress(capsys)[0]] == [0, 2]
-    (folder / "own" / "gain.yml").write_text("%YAML:1.0\n---\ngain: 3\n")
-    assert stress(capsys)[0] == 0
-
-
 def test_files_that_the_tracker_writes_do_not_count(folder: Path, capsys) -> None:
     text = (
         "\nimport time\nfrom pathlib import Path\nPath('log').write_text(str(time.time()))\nPath('log').read_text()\n"
