@@ -80,11 +80,13 @@ def user_code(
 
 def what_was_raised(error: BaseException) -> str:
     """Returns the type of an exception and the first line of its message, such as "SystemExit: 0"."""
+    from tracking.running.user_modules import PRIVATE
+
     try:
         text = str(error)
     except BaseException as failed:
         text = f"a message that cannot be read: its __str__ raises {type(failed).__name__}"
-    return f"{type(error).__name__}: {text}".partition("\n")[0]
+    return f"{type(error).__name__}: {PRIVATE.sub('', text)}".partition("\n")[0]
 
 
 def tracker_failed(tracker: str, method: str, place: str, error: BaseException) -> WorkError:

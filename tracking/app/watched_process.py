@@ -9,8 +9,10 @@ from __future__ import annotations
 import os
 import re
 import signal
+import socket
 import threading
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from functools import partial
 from typing import NoReturn
 
@@ -18,7 +20,7 @@ from scenarios.errors import WorkError
 from tracking.app.command_result import print_error
 
 CLASS = re.compile(r"(?:.*=)?(.*\.py|[A-Za-z_][\w.]*):[A-Za-z_]\w*")  # file.py:Class, module:Class
-SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+SIGNALS = (signal.SIGINT, signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM))  # Windows has no SIGHUP
 
 
 def user_trackers(arguments: Sequence[str]) -> list[str]:
@@ -32,28 +34,29 @@ def watched(trackers: Sequence[str], as_json: bool) -> Callable[[], object]:
     names, for the message.
 
     The parent process does not return. It exits with the child's exit code, or with an error line and 1 if the child
-    ended otherwise. On systems without sigwaitinfo there is no child.
+    ended otherwise. On systems without sigwaitinfo (macOS, Windows) there is
+    no child, and such an end is not noticed.
     """
     if not hasattr(signal, "sigwaitinfo"):
         return lambda: None
-    (done, mark), (parent, held) = os.pipe(), os.pipe()
+    here, there = socket.socketpair()
     before = signal.pthread_sigmask(signal.SIG_BLOCK, (*SIGNALS, signal.SIGCHLD))
     child = os.fork()
     if child:
-        os.close(mark)
-        _wait(child, done, trackers, as_json)
+        there.close()
+        _wait(child, here, trackers, as_json)
+    here.close()
     signal.pthread_sigmask(signal.SIG_SETMASK, before)
-    os.close(held)
-    threading.Thread(target=_exit_with, args=(parent,), daemon=True).start()
-    return partial(os.write, mark, b".")
+    threading.Thread(target=_exit_with_parent, args=(there,), daemon=True).start()
+    return partial(there.sendall, b".")
 
 
-def _exit_with(parent: int) -> None:
-    os.read(parent, 1)
+def _exit_with_parent(there: socket.socket) -> None:
+    there.recv(1)
     os._exit(1)
 
 
-def _wait(child: int, done: int, trackers: Sequence[str], as_json: bool) -> NoReturn:
+def _wait(child: int, here: socket.socket, trackers: Sequence[str], as_json: bool) -> NoReturn:
     passed_on = set[int]()
     ended, status = 0, 0
     while not ended:
@@ -63,12 +66,9 @@ def _wait(child: int, done: int, trackers: Sequence[str], as_json: bool) -> NoRe
         elif received.si_code <= 0:  # of kill; those of the terminal reach the child, too
             passed_on.add(received.si_signo)
             os.kill(child, received.si_signo)
-    os.set_blocking(done, False)
-    code = os.waitstatus_to_exitcode(status)
-    try:
-        finished = os.read(done, 1) == b"."
-    except BlockingIOError:  # a process that the tracker has left behind holds the pipe open
-        finished = False
+    code, finished = os.waitstatus_to_exitcode(status), False
+    with suppress(BlockingIOError):  # a process that the tracker has left behind holds the socket open
+        finished = here.recv(1, socket.MSG_DONTWAIT) == b"."
     if -code in passed_on:
         signal.signal(-code, signal.SIG_DFL)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)

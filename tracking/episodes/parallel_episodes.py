@@ -136,9 +136,7 @@ def _runnable(tracker: TunedTracker) -> str | type[Tracker] | TimeLimited:
         )  # fmt: skip
     if isinstance(tracker.tracker, type) or tracker.step_timeout is None:
         return tracker.tracker
-    if tracker not in _limited:
-        _limited[tracker] = TimeLimited(tracker.tracker, tracker.step_timeout)
-    return _limited[tracker]
+    return _limited.setdefault(tracker, TimeLimited(tracker.tracker, tracker.step_timeout))
 
 
 @cache

@@ -12,7 +12,7 @@ from tracking.episodes.episode import Source, streams_for
 from tracking.grouping.link_rule import LinkRule
 from tracking.running.time_limit import TimeLimited
 from tracking.running.tracker_registry import config_class, find, located
-from tracking.running.used_files import code_of
+from tracking.running.used_files import code_of, folder_of
 from tracking.scoring.people_comparison import Similarity
 
 RULE = LinkRule.tracker
@@ -26,6 +26,7 @@ class TunedTracker:
     name: str
     needs: tuple[str, ...]
     code: str = ""  # as `used_files.code_of`
+    folder: str = ""  # of the file that defines it
     objective: str = "objective"  # key of the score that it is tuned for by default
     detections: DetectionMode = "file"  # its input by default
     step_timeout: float | None = None  # seconds that each `reset` and `step` may take; never for a class and the rule
@@ -66,4 +67,5 @@ def tuned_tracker(tracker: str | type[Tracker], step_timeout: float | None = Non
     if step_timeout is not None:
         TimeLimited(spec, step_timeout)  # refuses a class, and a wrong limit
     mode: DetectionMode = "file" if {"boxes", "points"} & {*found.needs} else "image"
-    return TunedTracker(spec, name, tuple(found.needs), code_of(found), detections=mode, step_timeout=step_timeout)
+    code, folder = code_of(found), folder_of(found)
+    return TunedTracker(spec, name, tuple(found.needs), code, folder, detections=mode, step_timeout=step_timeout)

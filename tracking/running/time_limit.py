@@ -6,9 +6,8 @@ outside. Contexts, frames and tracks pass through a pipe as pickles.
 
 from __future__ import annotations
 
+import faulthandler
 import itertools
-import signal
-import sys
 from typing import Any, Self
 
 from scenarios.errors import InputError
@@ -123,7 +122,7 @@ class RemoteTracker:
         return result
 
 
-_sent = (-1, 0, 0)  # In the process: what was known when `used` was sent last.
+_sent = (-1, 0)  # In the process: what was known when `used` was sent last.
 _made: dict[int, Tracker] = {}  # In the process: the tracker by its number; at most one.
 
 
@@ -141,12 +140,12 @@ def _call(request: tuple[int, str, tuple[Any, ...], float]) -> Any:
         return None
     if number not in _made:
         raise RuntimeError("the process of this tracker was started again since its reset")
-    signal.setitimer(signal.ITIMER_REAL, limit)  # without a handler this ends the process, also in compiled code
+    faulthandler.dump_traceback_later(limit, exit=True)  # ends the process, also in compiled code
     tracker = type(_made[number])
     try:
         with inside(owner_of(tracker.__module__)):
             result, learned = getattr(_made[number], method)(*given), learned_by(_made[number])
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-    before, _sent = _sent, (number, len(sys.modules), used_files.opened())
+        faulthandler.cancel_dump_traceback_later()
+    before, _sent = _sent, (number, used_files.opened())
     return result, learned, {} if _sent == before else used_files.used(tracker)

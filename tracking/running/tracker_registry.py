@@ -14,7 +14,7 @@ from scenarios.errors import InputError
 from scenarios.loading.toml_files import did_you_mean
 from sim.types import Tracker
 from tracking.config import Config
-from tracking.running import used_files, user_modules
+from tracking.running import used_files
 from tracking.user_code import tracker_failed, user_code, what_was_raised
 
 REGISTRY = {
@@ -57,7 +57,7 @@ def _from_file(path: Path) -> Any:
     if not path.is_file():
         raise InputError(file=path, got="no such file", expected="a Python file", remedy="check the path")
     with user_code(lambda error: _import_failed(path, error), passing=()):
-        return user_modules.load(path, used_files.inside)
+        return used_files.load(path)
 
 
 def _from_module(name: str) -> Any:

@@ -10,40 +10,44 @@ Files that a compiled library opens itself are known if the tracker's code names
 
 from __future__ import annotations
 
+import ast
 import hashlib
+import importlib
 import os
 import secrets
 import sys
 import sysconfig
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from functools import cache
 from importlib.machinery import ModuleSpec
+from importlib.util import source_from_cache
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from scenarios.errors import InputError
 from sim.hashing import PACKAGES, canonical_hash, file_hash
 from sim.types import Tracker
 from tracking.running import user_modules
-from tracking.running.user_modules import PREFIX, strings_of
+from tracking.running.user_modules import package_of
 
 INSTALLED = "packages"  # name of the fingerprint of all installed packages
 OURS = Path(__file__).resolve().parents[2]
 NOT_USERS = {"site-packages", "dist-packages", "__pycache__"}  # names of folders
 SYSTEM = ("/dev/", "/proc/", "/sys/")
+READS = {"open", "os.listdir", "os.scandir", "ctypes.dlopen"}  # audit events of a file or folder that is read
+IMPORT = "<frozen importlib._bootstrap_external>"  # file of the code that lists folders in which modules are
 THIS_PROCESS = secrets.token_hex(6)
-LONGEST_NAME = 255  # characters of a string in code that may name a file
 
 _owner = ""  # whose code is running; "": this project's
-_home = ""  # working folder of the command, while a tracker is in another one
 _opened: set[str] = set()  # absolute paths that it has opened or listed since it began
 _written: set[str] = set()  # that any tracker has written
-_files: dict[str, dict[str, str]] = {}  # by owner: fingerprints of the files that were opened, by absolute path
+_files: dict[str, dict[str, str]] = {}  # by owner: fingerprints of what was opened, here and in its other processes
 _folders: dict[str, str] = {}  # by owner: its working folder, if it has changed it
-_elsewhere: dict[str, dict[str, str]] = {}  # by owner: fingerprints from its other processes, by name
+_times = 0  # how many times files were opened, and noted
 
 
 @dataclass(frozen=True)
@@ -51,46 +55,57 @@ class _Module:
     spec: ModuleSpec | None  # another one after a reload
     path: str
     hash: str
-    words: frozenset[str]  # strings in its code
+    named: frozenset[str]  # paths of the files that strings in its code name
 
 
-_modules: dict[str, _Module] = {}  # modules of users that are in no private package, as they were at first sight
+_modules: dict[str, _Module] = {}  # modules of users as they were at first sight
+_latest: dict[Path, tuple[str, str]] = {}  # names of the package, and of the module, of each tracker's file
 
 
 def owner_of(module: str) -> str:
     """Returns whose code a module is, by its name: its package, or "" for this project."""
     head = module.partition(".")[0]
-    return "" if head in PACKAGES else head
+    return package_of(module) if head in PACKAGES else head
+
+
+def load(file: Path) -> ModuleType:
+    """Returns the module of a tracker's file. It is loaded anew if it, or a file that it imported, has changed."""
+    file = file.resolve()
+    package, module = _latest.get(file, ("", ""))
+    if not package or changes(user_modules.packages[package].files):
+        package, module = user_modules.new_package(file)
+        with inside(package):
+            importlib.import_module(module)
+        own = user_modules.packages[package]
+        own.code = canonical_hash(relative(own.files, own.folder))[:12]
+        _latest[file] = package, module
+    return sys.modules[module]
 
 
 @contextmanager
 def inside(owner: str) -> Iterator[None]:
     """Stands around code of this owner: notes the files that it opens, and keeps its working folder apart from that of
     the command. It has no effect for "", this project's code, and inside another such block."""
-    global _owner, _home, _times
+    global _owner, _times
     if not owner or _owner:
         yield
         return
     _listen()
-    _owner = owner
+    _owner, home = owner, _working_folder()
     try:
         if owner in _folders:
             os.chdir(_folders[owner])
         yield
     finally:
         _owner = ""
-        if _home:
+        if _working_folder() != home:
             _folders[owner] = _working_folder()
-            os.chdir(_home)
-            _home = ""
+            os.chdir(home)
         user_modules.forget_aliases()
         if _opened:
             _times += 1
             _files.setdefault(owner, {}).update({path: fingerprint(path) for path in _opened})
             _opened.clear()
-
-
-_times = 0
 
 
 @cache
@@ -105,25 +120,25 @@ def _working_folder() -> str:
 
 
 def _hook(event: str, arguments: tuple[Any, ...]) -> None:
-    global _home
-    if not _owner or event not in ("open", "os.listdir", "os.scandir", "os.chdir"):
+    if not _owner or event not in READS:
         return
     with suppress(Exception):  # an exception here would be one of open()
-        if event == "os.chdir":
-            _home = _home or _working_folder()
-            return
         path = os.path.abspath(os.fsdecode(arguments[0] or "."))
+        if path.endswith(".pyc"):
+            path = source_from_cache(path)
         if event == "open" and arguments[2] & (os.O_WRONLY | os.O_CREAT | os.O_TRUNC):
             _written.add(path)
-        elif event == "open" or path not in sys.path_importer_cache:
+        elif event != "os.listdir" or sys._getframe(1).f_code.co_filename != IMPORT:
             _opened.add(path)
 
 
 def fingerprint(path: str) -> str:
     """Returns the fingerprint of the file or folder at an absolute path as it is now."""
     try:
-        names = os.listdir(path) if os.path.isdir(path) else None
-        return file_hash(Path(path)) if names is None else hashlib.sha256("\0".join(sorted(names)).encode()).hexdigest()
+        if not os.path.isdir(path):
+            return file_hash(Path(path))
+        names = sorted({*os.listdir(path)} - NOT_USERS)
+        return hashlib.sha256("\0".join(names).encode()).hexdigest()
     except OSError:
         return ""
 
@@ -149,8 +164,10 @@ def used(tracker: type[Tracker]) -> dict[str, str]:
     if not owner:
         return {}
     found = dict(_modules_used(owner))
+    if owner in user_modules.packages:
+        found |= user_modules.packages[owner].files
     found |= {p: known for p, known in _files.get(owner, {}).items() if p not in _written and is_users(p)}
-    return found | _elsewhere.get(owner, {}) | {INSTALLED: packages_hash()}
+    return found | {INSTALLED: packages_hash()}
 
 
 def opened() -> int:
@@ -160,7 +177,7 @@ def opened() -> int:
 
 def note(tracker: type[Tracker], others: Mapping[str, str]) -> None:
     """Notes what a tracker class has used in another process, as `used` returned it there."""
-    _elsewhere.setdefault(owner_of(tracker.__module__), {}).update(others)
+    _files.setdefault(owner_of(tracker.__module__), {}).update(others)
 
 
 def changes(stored: Mapping[str, str], folder: str = "") -> list[str]:
@@ -181,45 +198,42 @@ def relative(found: Mapping[str, str], folder: str) -> dict[str, str]:
 def folder_of(tracker: type[Tracker]) -> str:
     """Returns the folder of the file that defines a tracker class, "" if there is none."""
     file = getattr(sys.modules.get(tracker.__module__), "__file__", None)
-    return os.path.dirname(os.path.realpath(file)) if file else ""
+    return os.path.dirname(os.path.abspath(file)) if file else ""
 
 
 def _modules_used(owner: str) -> Iterator[tuple[str, str]]:
-    """Yields path and hash of the modules of the owner's private package, and of other modules of users."""
-    package = user_modules.packages.get(owner)
-    if package is not None:
-        for path, known in package.files.items():
-            yield str(path), known
-            yield from _named(package.words[path], path.parent)
+    """Yields path and fingerprint of the modules of users, and of the files that strings in their code name."""
     for name in [*sys.modules]:
-        known_module = _module(name) if name != "__main__" or owner == "__main__" else None
-        if known_module is not None:
-            yield known_module.path, known_module.hash
-            yield from _named(known_module.words, Path(known_module.path).parent)
+        known = _module(name) if package_of(name) in ("", owner) else None
+        if known is not None and (name != "__main__" or owner == "__main__"):
+            yield known.path, known.hash
+            yield from ((path, fingerprint(path)) for path in known.named - _written)
 
 
 def _module(name: str) -> _Module | None:
-    """Returns a module of a user that is in no private package, None for another module."""
+    """Returns a module of a user, None for another module."""
     module = sys.modules.get(name)
     file = getattr(module, "__dict__", {}).get("__file__")
-    if name.startswith(PREFIX) or not isinstance(file, str) or not is_users(file):
+    if not isinstance(file, str) or not is_users(file):
         return None
     spec = getattr(module, "__spec__", None)
     if name not in _modules or _modules[name].spec is not spec:
-        path, words = os.path.realpath(file), frozenset[str]()
+        path, named = os.path.abspath(file), set[str]()
         with suppress(Exception):  # a compiled module has no code
-            words = frozenset(strings_of(compile(Path(path).read_bytes(), path, "exec")))
-        _modules[name] = _Module(spec, path, fingerprint(path), words)
+            named = {*_named(ast.parse(Path(path).read_bytes()), os.path.dirname(path))}
+        _modules[name] = _Module(spec, path, fingerprint(path), frozenset(named))
     return _modules[name]
 
 
-def _named(words: Iterable[str], folder: Path) -> Iterator[tuple[str, str]]:
-    """Yields path and fingerprint of the files that strings in code name, below the folder."""
-    for word in words:
-        if 0 < len(word) <= LONGEST_NAME and "." in word and "\0" not in word and (folder / word).is_file():
-            path = os.path.realpath(folder / word)
-            if path not in _written and is_users(path):
-                yield path, fingerprint(path)
+def _named(code: ast.Module, folder: str) -> Iterator[str]:
+    """Yields the paths of files that strings in the code name: in the working folder, in this folder, or below it in
+    one that another string names."""
+    words = {node.value for node in ast.walk(code) if isinstance(node, ast.Constant) and isinstance(node.value, str)}
+    words |= {word.lstrip(os.sep) for word in words}  # of f"{folder}/name"
+    for place in (_working_folder(), folder, *(os.path.join(folder, word) for word in words if "." not in word)):
+        if os.path.isdir(place):
+            paths = (os.path.abspath(os.path.join(place, word)) for word in words if "." in word)
+            yield from (path for path in paths if os.path.isfile(path) and is_users(path))
 
 
 @cache
@@ -251,7 +265,7 @@ def require_as_imported(tracker: type[Tracker]) -> None:
     if owner in user_modules.packages:
         heads |= user_modules.packages[owner].installed
     for name in [name for name in sys.modules if owner and name.partition(".")[0] in heads]:
-        known = _module(name)
+        known = None if package_of(name) else _module(name)
         if known is not None and fingerprint(known.path) != known.hash:
             raise InputError(
                 file=known.path, got=f"another content than when {name} was imported", expected="the code that runs",

@@ -1,176 +1,120 @@
 """Loads the file of a user's tracker with the modules beside it; each tracker's file has modules of its own.
 
-The file and its neighbours form a package with a private name. Their import statements look for a neighbour first, as
-in a script, then for an installed module. A name that a neighbour lacks is taken from the installed module of the same
-name. So a neighbour `queue.py`, `sim.py` or `tracking.py` hides no module from other code, folders may have modules of
-equal names, and files that have changed are loaded anew.
+The file and its neighbours form a package below this module, whose name holds the folder. So every process that imports
+`tracking` can import it, as the processes of a pool do. Import statements look for a neighbour first, as in a script,
+then for an installed module. A name that a neighbour lacks is taken from the installed module of the same name. So a
+neighbour `queue.py`, `sim.py` or `tracking.py` hides no module from other code, folders may have modules of equal
+names, and files that have changed are loaded anew.
 """
 
 from __future__ import annotations
 
 import builtins
-import hashlib
 import importlib
 import importlib.util
 import os
+import re
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache, partial
 from importlib.abc import Loader
-from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader, ModuleSpec, SourceFileLoader
+from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader, FileFinder, ModuleSpec, SourceFileLoader
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from sim.hashing import PACKAGES, canonical_hash, file_hash
+from sim.hashing import PACKAGES, file_hash
 
-PREFIX = "_flockscope_"
+__path__: list[str] = []  # so that this module can have submodules
+PREFIX = f"{__name__}."
+PRIVATE = re.compile(re.escape(PREFIX) + r"[0-9a-f]+x*\.")  # what stands before a neighbour's own name
+DOT = "\u2024"  # stands for a dot in the name of a file, as in tracker.v2.py
 
 
 @dataclass
 class UserPackage:
     """The package of one tracker's file.
 
-    State: the hash of each file as it was executed, the strings in its code, the names of the installed modules that it
-    imports, and `code`, a hash of the files that the tracker's file imports at once.
+    State: the hash of each file as it was executed, the names of the installed modules that it imports, and `code`, a
+    hash of the files that the tracker's file imports at once.
     """
 
-    folder: Path
+    folder: str
     code: str = ""
-    files: dict[Path, str] = field(default_factory=dict)
-    words: dict[Path, frozenset[str]] = field(default_factory=dict)
+    files: dict[str, str] = field(default_factory=dict)
     installed: set[str] = field(default_factory=set)
 
 
 packages: dict[str, UserPackage] = {}  # by private name
 aliases: set[str] = set()  # public names under which neighbours are found while a tracker's code runs
-_latest: dict[Path, str] = {}  # name of the package of each tracker's file
 
 
-def load(file: Path, inside: Callable[[str], AbstractContextManager[None]]) -> ModuleType:
-    """Returns the module of a tracker's file. It is loaded anew if it, or a file that it imported, has changed. inside:
-    given the name of the private package, returns a context manager in which the file is executed."""
-    file = file.resolve()
-    name = _latest.get(file, "")
-    if not name or any(_hash_now(path) != known for path, known in packages[name].files.items()):
-        name = _load_package(file, inside)
-        _latest[file] = name
-    return sys.modules[f"{name}.{_stem(file)}"]
+def package_of(module: str) -> str:
+    """Returns the name of the private package that a module belongs to, by the module's name; "" if to none."""
+    return PREFIX + module.removeprefix(PREFIX).partition(".")[0] if module.startswith(PREFIX) else ""
 
 
-def _load_package(file: Path, inside: Callable[[str], AbstractContextManager[None]]) -> str:
-    if _Finder not in sys.meta_path:
-        sys.meta_path.insert(0, _Finder)
-        sys.meta_path.append(_Neighbours)
-    # The same name in every process, for pickles and numba's cache; of a folder, as its files share their caches.
-    name = PREFIX + hashlib.sha256(str(file.parent).encode()).hexdigest()[:12]
+def new_package(file: Path) -> tuple[str, str]:
+    """Returns the names of a new package, and of its module for a tracker's file at an absolute path. They are the same
+    in every process, for pickles and numba's cache, and the package's is the same for all files of a folder."""
+    name = PREFIX + os.fsencode(file.parent).hex()
     while name in packages:
         name += "x"
-    packages[name] = UserPackage(file.parent)
-    package = ModuleType(name)
-    package.__path__ = [str(file.parent)]
-    sys.modules[name] = package
-    try:
-        spec = _spec(f"{name}.{_stem(file)}", file)
-        module = importlib.util.module_from_spec(spec)
-        sys.modules[spec.name] = module
-        assert spec.loader is not None
-        with inside(name):
-            spec.loader.exec_module(module)
-    except BaseException:
-        _places.cache_clear()  # a missing neighbour may be put there
-        for loaded in [one for one in sys.modules if one.partition(".")[0] == name]:
-            del sys.modules[loaded]
-        del packages[name]
-        raise
-    own = packages[name]
-    own.code = canonical_hash({os.path.relpath(path, own.folder): known for path, known in own.files.items()})[:12]
-    return name
-
-
-def _stem(file: Path) -> str:
-    return file.stem.replace(".", "_")
-
-
-def _hash_now(path: Path) -> str:
-    return file_hash(path.read_bytes()) if path.is_file() else ""
+    return name, f"{name}.{file.stem.replace('.', DOT)}"
 
 
 class _Loader(SourceFileLoader):
     # Compiles the source itself: a stored .pyc is taken for the source's if both are of one second and size.
 
     def get_code(self, fullname: str) -> CodeType:
-        content, path = self.get_data(self.path), Path(self.path)
-        code: CodeType = self.source_to_code(content, self.path)
-        package = packages[fullname.partition(".")[0]]
-        package.files[path], package.words[path] = file_hash(content), frozenset(strings_of(code))
-        return code
+        content = self.get_data(self.path)
+        packages[package_of(fullname)].files[self.path] = file_hash(content)
+        return self.source_to_code(content, self.path)
 
     def exec_module(self, module: ModuleType) -> None:
-        package, _, name = module.__name__.partition(".")
-        own_import = partial(_import, package)
-        module.__dict__["__builtins__"] = {**vars(builtins), "__import__": own_import}
+        package = package_of(module.__name__)
+        name = module.__name__.removeprefix(f"{package}.")
+        module.__dict__["__builtins__"] = {**vars(builtins), "__import__": partial(_import, package)}
         if _installed(name, packages[package].folder):
             module.__dict__["__getattr__"] = partial(_of_installed, name, self.path)
         super().exec_module(module)
 
 
-def strings_of(code: CodeType) -> Iterator[str]:
-    """Yields all strings in the code of a module and of its functions."""
-    for constant in code.co_consts:
-        if isinstance(constant, CodeType):
-            yield from strings_of(constant)
-        elif isinstance(constant, str):
-            yield constant
-
-
-def _spec(name: str, file: Path, places: list[str] | None = None) -> ModuleSpec:
-    loader = (ExtensionFileLoader if file.suffix != ".py" else _Loader)(name, str(file))
-    spec = importlib.util.spec_from_file_location(name, file, loader=loader, submodule_search_locations=places)
-    assert spec is not None
-    return spec
+LOADERS = (ExtensionFileLoader, EXTENSION_SUFFIXES), (_Loader, [".py"])
 
 
 class _Finder:
     # Finds the modules of private packages only.
 
-    @classmethod
-    def find_spec(cls, name: str, path: Sequence[str] | None = None, target: object = None) -> ModuleSpec | None:
-        tail = name.rpartition(".")[2]
-        if name.startswith(PREFIX) and path is None and packages:  # of another process, or before the folder was moved
-            folder = packages[next(reversed(packages))].folder
+    @staticmethod
+    def find_spec(name: str, path: Sequence[str] | None = None, target: object = None) -> ModuleSpec | None:
+        package = package_of(name)
+        if package and package == name:
+            folder = os.fsdecode(bytes.fromhex(name.removeprefix(PREFIX).rstrip("x")))
+            if packages and not os.path.isdir(folder):  # numba's cache was written before the folder was moved
+                folder = packages[next(reversed(packages))].folder
             packages[name] = UserPackage(folder)
-            return _folder_spec(name, folder)
-        for folder in map(Path, path or () if name.startswith(PREFIX) else ()):
-            for suffix in (".py", *EXTENSION_SUFFIXES):
-                package, module = folder / tail / f"__init__{suffix}", folder / f"{tail}{suffix}"
-                if package.is_file():
-                    return _spec(name, package, [str(folder / tail)])
-                if module.is_file():
-                    return _spec(name, module)
-            if (folder / tail).is_dir():
-                return _folder_spec(name, folder / tail)
-        return None
-
-
-def _folder_spec(name: str, folder: Path) -> ModuleSpec:
-    spec = ModuleSpec(name, None, is_package=True)
-    spec.submodule_search_locations = [str(folder)]
-    return spec
+            spec = ModuleSpec(name, None, is_package=True)
+            spec.submodule_search_locations = [folder]
+            return spec
+        if DOT in name and package:
+            file = Path(packages[package].folder, name.rpartition(".")[2].replace(DOT, ".") + ".py")
+            return importlib.util.spec_from_file_location(name, file, loader=_Loader(name, str(file)))
+        found = (FileFinder(folder, *LOADERS).find_spec(name) for folder in (path or () if package else ()))
+        return next(filter(None, found), None)
 
 
 class _Neighbours:
     # Finds neighbours for importlib.import_module and pickle, which no import statement calls, after installed modules.
 
-    @classmethod
-    def find_spec(cls, name: str, path: Sequence[str] | None = None, target: object = None) -> ModuleSpec | None:
+    @staticmethod
+    def find_spec(name: str, path: Sequence[str] | None = None, target: object = None) -> ModuleSpec | None:
         frame = sys._getframe()
-        while frame.f_back is not None and not frame.f_globals.get("__name__", "").startswith(PREFIX):
+        while frame.f_back is not None and not package_of(frame.f_globals.get("__name__", "")):
             frame = frame.f_back
-        package = frame.f_globals.get("__name__", "").partition(".")[0]
-        if package not in packages or _Finder.find_spec(f"{package}.{name}", [str(packages[package].folder)]) is None:
+        package = package_of(frame.f_globals.get("__name__", ""))
+        if package not in packages or _Finder.find_spec(f"{package}.{name}", [packages[package].folder]) is None:
             return None
         aliases.add(name)
         return ModuleSpec(name, _Alias(f"{package}.{name}"))
@@ -187,6 +131,10 @@ class _Alias(Loader):
         pass
 
 
+sys.meta_path.insert(0, _Finder)
+sys.meta_path.append(_Neighbours)
+
+
 def forget_aliases() -> None:
     """Removes the public names of neighbours, which other folders may have, too."""
     for name in aliases:
@@ -198,8 +146,8 @@ def forget_aliases() -> None:
 def _places(package: str, head: str) -> tuple[str, ...]:
     """Returns the prefixes under which a name is looked for, in order: the package's and "", or one of them."""
     folder = packages[package].folder
-    neighbour = _Finder.find_spec(f"{package}.{head}", [str(folder)])
-    sources_of_ours = head in PACKAGES and all((folder / name / "__init__.py").is_file() for name in PACKAGES)
+    neighbour = _Finder.find_spec(f"{package}.{head}", [folder])
+    sources_of_ours = head in PACKAGES and all(Path(folder, name, "__init__.py").is_file() for name in PACKAGES)
     if neighbour is None or sources_of_ours:
         return ("",)
     if not _installed(head, folder):
@@ -207,14 +155,16 @@ def _places(package: str, head: str) -> tuple[str, ...]:
     return (f"{package}.", "") if neighbour.loader is not None else ("", f"{package}.")
 
 
-def _installed(name: str, folder: Path) -> bool:
+def _installed(name: str, folder: str) -> bool:
     """Returns True if there is a module of this name outside of the folder."""
     try:
         spec = importlib.util.find_spec(name) if name and "." not in name else None
     except (ImportError, ValueError):  # it has no spec, such as __main__
         return False
-    own = {str(folder / name), str(folder / f"{name}.py"), str(folder / name / "__init__.py")}
-    return spec is not None and own.isdisjoint({spec.origin, *(spec.submodule_search_locations or ())})
+    own = {os.path.join(folder, place) for place in (name, f"{name}.py", f"{name}/__init__.py")}
+    if spec is None or isinstance(spec.loader, _Alias):
+        return False
+    return own.isdisjoint({spec.origin, *(spec.submodule_search_locations or ())})
 
 
 def _import(

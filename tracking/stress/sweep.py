@@ -226,7 +226,7 @@ class Sweep:
 
     def _key(self, name: str, scene: Scene) -> str:
         tracker = self.trackers.get(name)
-        own = (str(tracker.tracker), tracker.code, tracker.step_timeout) if tracker else self._of_oracle(name).needs
+        own = str(tracker) if tracker else self._of_oracle(name).needs
         facts = [runtime(), name, own, self.plan.detections, *map(str, scene.source.key)]
         return hashlib.sha256(json.dumps(facts).encode()).hexdigest()[:24]
 

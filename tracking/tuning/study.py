@@ -35,9 +35,7 @@ from optuna.trial import FrozenTrial, TrialState
 from scenarios.errors import FlockscopeError, InputError
 from tracking.episodes.episode import Episode
 from tracking.episodes.parallel_episodes import PlayEpisodes
-from tracking.episodes.tuned_tracker import RULE
-from tracking.running.tracker_registry import find
-from tracking.running.used_files import UsedFiles, changes, folder_of, relative
+from tracking.running.used_files import UsedFiles, changes, relative
 from tracking.stats import mean_of_known
 from tracking.tuning.candidates import STORED, TrialRecord
 from tracking.tuning.options import Progress
@@ -113,7 +111,7 @@ class SearchStudy:
 
     def __init__(self, plan: SearchPlan, study: optuna.Study, locks: StudyLocks, storage: object = None) -> None:
         self.plan, self.optuna, self.locks, self._used = plan, study, locks, UsedFiles()
-        self._folder = _folder(plan)
+        self._folder = plan.tracker.folder
         self._space = {p.name: distribution(p) for p in plan.space}
         with self.locks.study:
             if not self.trials() and SETTINGS not in study.user_attrs:
@@ -243,15 +241,11 @@ def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> N
     if different := [key for key in mine if stored.get(key) != mine[key]]:
         key, got = different[0], f"another search: {', '.join(different)} differ"
         expected, remedy = f"{key} {stored.get(key)}, not {mine[key]}", f"{remedy}, or repeat the command that began it"
-    elif changed := changes(study.user_attrs.get(USED, {}), _folder(plan)):
+    elif changed := changes(study.user_attrs.get(USED, {}), plan.tracker.folder):
         got, expected = f"trials made before {', '.join(changed)} changed", "the tracker as it was"
     else:
         return
     raise InputError(file=storage, place=f"study {study.study_name}", got=got, expected=expected, remedy=remedy)
-
-
-def _folder(plan: SearchPlan) -> str:
-    return "" if plan.tracker.name == RULE else folder_of(find(plan.tracker.tracker))
 
 
 @contextmanager

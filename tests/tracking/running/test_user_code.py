@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar
-
 import numpy as np
 import pytest
 
@@ -12,7 +9,6 @@ from scenarios.errors import InputError, WorkError
 from sim.types import Detections, Frame, Sequence
 from tests.tracking.running.test_run import Stranger
 from tracking.app.cli import run
-from tracking.config import Config, param
 from tracking.running.run import track
 from tracking.user_code import recorded_interrupts
 
@@ -132,20 +128,6 @@ def test_no_exit_from_within_ends_a_command_as_if_all_were_well(tmp_path, capsys
     monkeypatch.setattr("tracking.app.commands.track.track", leave)
     assert run(command(tmp_path, "", "pass")) == 1
     assert "SystemExit: 0" in capsys.readouterr().err
-
-
-@dataclass(frozen=True)
-class Exiting(Config):
-    tracker: ClassVar[str] = "exiting"
-    reach: float = param(1.0, (0.5, 2.0), "m", "no effect")
-
-    def check(self):
-        raise SystemExit(0)
-
-
-def test_the_check_of_a_config():
-    with pytest.raises(WorkError, match="exiting: its parameters: got SystemExit: 0"):
-        Exiting()
 
 
 @pytest.mark.parametrize("seed", [2**63, 10**30, -1, 1.5, True])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import pickle
 import queue
+import re
 import subprocess
 import sys
 import types
@@ -76,6 +78,15 @@ def test_a_name_that_both_lack_is_an_error_that_names_both_files(tmp_path: Path)
     spec = write(tmp_path, "from tracking import nothing", "0", tracking=OWN)
     with pytest.raises(InputError, match=rf"{tmp_path}/tracking.py nor .*init__.py has 'nothing'"):
         find(spec)
+
+
+WRONG = {"from helper import no": "from 'helper' (", "import helper.no": "'helper.no'"}
+
+
+@pytest.mark.parametrize(("imports", "words"), WRONG.items())
+def test_errors_have_the_names_that_the_user_gave(tmp_path: Path, imports: str, words: str) -> None:
+    with pytest.raises(InputError, match=re.escape(words)):
+        find(write(tmp_path, imports, "0", helper=""))
 
 
 def test_a_file_may_have_the_name_of_one_of_our_packages(tmp_path: Path) -> None:
@@ -175,3 +186,15 @@ def test_a_module_of_a_package_that_has_changed_is_refused(tmp_path: Path, monke
     command = [sys.executable, "-c", "from tracking.running.tracker_registry import find; print(find('wE_mine:Mine'))"]
     env = {"PYTHONPATH": f"{Path(tracking.__file__).parents[1]}:{tmp_path}"}
     assert "Mine" in subprocess.run(command, env=env, capture_output=True, text=True, check=True).stdout
+
+
+def test_a_function_of_the_file_reaches_a_process_that_knows_nothing_of_it(tmp_path: Path) -> None:
+    """As multiprocessing's spawn and joblib send it; the pool waited for ever for a worker that could not import it."""
+    for stem in ("mine", "mine.v2"):
+        write(tmp_path, "import tracking\ndef double(x): return 2 * x * tracking.mine()", "1", tracking=OWN)
+        (tmp_path / "mine.py").rename(tmp_path / f"{stem}.py")
+        function = sys.modules[find(f"{tmp_path}/{stem}.py:Mine").__module__].double
+        code = "import pickle, sys; print(pickle.loads(bytes.fromhex(sys.argv[1]))(3))"
+        command = [sys.executable, "-c", code, pickle.dumps(function).hex()]
+        env = {"PYTHONPATH": str(Path(tracking.__file__).parents[1])}
+        assert subprocess.run(command, env=env, capture_output=True, text=True, check=True).stdout == "42\n"

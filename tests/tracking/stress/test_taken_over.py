@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-import json
-import os
 import re
-import subprocess
+import shutil
 import sys
 from collections.abc import Callable
+from functools import cache
+from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import tracking
+from sim import hashing
 from tests.refusals import answer
 from tests.tuning_toys import write_scenes
 from tracking.app.cli import run
@@ -108,20 +109,29 @@ def test_the_guides_tracker_whose_base_class_is_broken_has_another_score(folder:
     assert (taken, broken) == (0, stress(capsys, "--fresh")[1])
 
 
+def test_a_package_in_another_folder_has_episodes_of_its_own(folder: Path, capsys, monkeypatch) -> None:
+    """As two checkouts have, one of which is on the path: the files of the first are unchanged."""
+    nearest = (folder / "own" / "nearest.py").read_text()
+    found = []
+    for number in "1212":
+        package = folder / number / "wT_pkg"
+        package.mkdir(parents=True, exist_ok=True)
+        (package / "mine.py").write_text("from . import helper\n" + nearest)
+        (package / "helper.py").write_text(f"x = {number}")
+        with monkeypatch.context() as patch:
+            patch.syspath_prepend(folder / number)
+            for module in ("wT_pkg", "wT_pkg.mine", "wT_pkg.helper"):
+                patch.setitem(sys.modules, module, None)
+                del sys.modules[module]
+            line = ["stress", "wT_pkg.mine:Nearest", "--suite", "one.toml", "--seeds", "0:2", "--start", "2"]
+            found.append(answer(capsys, *line, "--by", "HOTA", "--out", "o")["taken_over"]["episodes"])
+    assert found == [0, 0, 2, 2]
+
+
 def test_a_file_that_was_missing(folder: Path, capsys) -> None:
     appended("own/lazy.py", "\ntry:\n    open('own/more.json')\nexcept OSError:\n    pass\n")(folder)
     assert [stress(capsys)[0], stress(capsys)[0]] == [0, 2]
     (folder / "own" / "more.json").touch()
-    assert stress(capsys)[0] == 0
-
-
-def test_a_file_that_a_compiled_library_opens(folder: Path, capsys) -> None:
-    """OpenCV opens it without Python; its name stands in the code."""
-    (folder / "own" / "gain.yml").write_text("%YAML:1.0\n---\ngain: 2\n")
-    text = "\nimport cv2, os\ncv2.FileStorage(os.path.join(os.path.dirname(__file__), 'gain.yml'), 0)\n"
-    appended("own/lazy.py", text)(folder)
-    assert [stress(capsys)[0], stress(capsys)[0]] == [0, 2]
-    (folder / "own" / "gain.yml").write_text("%YAML:1.0\n---\ngain: 3\n")
     assert stress(capsys)[0] == 0
 
 
@@ -133,47 +143,31 @@ def test_files_that_the_tracker_writes_do_not_count(folder: Path, capsys) -> Non
     assert [stress(capsys)[0], stress(capsys)[0]] == [0, 2]
 
 
-@pytest.mark.parametrize("what", ["sources", "numpy", "packages"])
-def test_other_sources_or_libraries(folder: Path, capsys, monkeypatch, what: str) -> None:
+def test_other_packages(folder: Path, capsys, monkeypatch) -> None:
     assert [stress(capsys)[0], stress(capsys)[0]] == [0, 2]
-    if what == "packages":
-        monkeypatch.setattr(used_files, "packages_hash", lambda: "another")
-    else:
-        from sim.hashing import runtime
-
-        monkeypatch.setattr("tracking.stress.sweep.runtime", lambda: {**runtime(), what: "another"})
+    monkeypatch.setattr(used_files, "packages_hash", lambda: "another")
     assert stress(capsys)[0] == 0
 
 
-def test_a_constant_of_the_scorer_and_the_version_of_numpy_in_a_copy(tmp_path: Path) -> None:
-    """A process of its own, with a copy of the sources, and one with a numpy that has another version."""
-    from shutil import copytree, ignore_patterns
+def test_a_constant_of_the_scorer_and_the_version_of_numpy_in_a_copy(folder: Path, capsys, monkeypatch) -> None:
+    """With hashes of a copy of the sources."""
+    for name in hashing.PACKAGES:
+        source = Path(hashing.__file__).parents[1] / name
+        shutil.copytree(source, folder / "copy" / name, ignore=shutil.ignore_patterns("__pycache__"))
+    constants = folder / "copy" / "tracking" / "scoring" / "people_comparison.py"
+    monkeypatch.setattr(hashing, "__file__", str(folder / "copy" / "sim" / "hashing.py"))
+    monkeypatch.setattr(hashing, "versions", hashing.versions.__wrapped__)
 
-    root = Path(tracking.__file__).parents[1]
-    for name in ("scenarios", "sim", "tracking", "tests"):
-        copytree(root / name, tmp_path / name, ignore=ignore_patterns("__pycache__"))
-    write_scenes(tmp_path)
-
-    def taken(*before: str) -> int:
-        code = "\n".join([*before, "from tracking.app.cli import main", "main()"])
-        line = ["stress", "blob", "--suite", "one.toml", "--seeds", "0:2", "--start", "2", "--out", "o", "--json"]
-        env = {**os.environ, "PYTHONPATH": str(tmp_path)}
-        done = subprocess.run(
-            [sys.executable, "-c", code, *line], cwd=tmp_path, env=env, capture_output=True, text=True
-        )
-        assert done.returncode == 0, done.stderr
-        return json.loads(done.stdout)["taken_over"]["episodes"]
+    def taken() -> int:
+        monkeypatch.setattr("tracking.stress.sweep.runtime", cache(hashing.runtime.__wrapped__))
+        return stress(capsys)[0]
 
     assert [taken(), taken()] == [0, 2]
-    constants = tmp_path / "tracking" / "scoring" / "people_comparison.py"
     constants.write_text(constants.read_text() + "\n# another constant\n")
     assert [taken(), taken()] == [0, 2]
-    other = (
-        "import importlib.metadata as m",
-        "v = m.version",
-        "m.version = lambda n: '2.0.99' if n == 'numpy' else v(n)",
-    )
-    assert [taken(*other), taken(*other), taken()] == [0, 2, 2]
+    version = metadata.version
+    monkeypatch.setattr(metadata, "version", lambda name: "2.0.99" if name == "numpy" else version(name))
+    assert [taken(), taken()] == [0, 2]
 
 
 TUNE = (
