@@ -24,7 +24,7 @@ from tracking.scoring.evaluation import Scorer, Scores
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.people_comparison import IncomparableError, Similarity
 from tracking.scoring.pooled_scores import pooled
-from tracking.stats import FEWEST, SURE, mean_of_finite
+from tracking.stats import SURE, few, mean_of_finite
 
 if TYPE_CHECKING:
     import pyarrow
@@ -99,7 +99,7 @@ class ComparedRuns:
         have it, or of a recording shorter than a minute."""
         if self.blocks is not None:
             return self.seconds < SURE
-        return self.ranking(key).sequences < FEWEST
+        return bool(few(self.ranking(key).sequences))
 
     def to_arrow(self, key: str = "objective") -> pyarrow.Table:
         """Returns the ranking by a score as a table, one row per run, best first, after the oracles.
@@ -124,7 +124,7 @@ class ComparedRuns:
             ends = np.concatenate([*(getattr(one, part) for one in of_oracles), getattr(ranking, part)])
             columns[part] = CATALOGUE[key].within(ends).tolist()
         of_runs = [self.indicative(key)] * len(names)
-        columns["indicative"] = [*(one.sequences < FEWEST for one in of_oracles), *of_runs]
+        columns["indicative"] = [*(bool(few(one.sequences)) for one in of_oracles), *of_runs]
         for each in CATALOGUE:
             means = [mean_of_finite(_values(rows[name], each)) for name in columns["run"]]
             if np.isfinite(means).any():

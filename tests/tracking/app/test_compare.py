@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from benchmarks.gate import false_regressions
 from tests.refusals import refused
 from tracking.app.cli import run
-from tracking.app.commands.compare import CONDITIONS, judged
+from tracking.app.commands.compare import judged
+from tracking.scoring.conditions import CONDITIONS
 
 KEYS = ("objective", "IDSW")
 WAY = dict.fromkeys(CONDITIONS, "a") | {"label_step": 1, "px_per_m": None}

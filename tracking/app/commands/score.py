@@ -11,7 +11,6 @@ from sim.store.seal import tracked_hash
 from sim.types import Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.compare import conditions
 from tracking.app.score_ranking import ranked_runs, ranking_result, scoring_notes
 from tracking.app.score_tables import CSV_HEAD, checked_key, csv_bytes, summary, tables
 from tracking.app.scored_sequence import is_class, run_names, score_sequence, scoring_jobs
@@ -19,6 +18,7 @@ from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.comparison import ComparedSequence, check_blocks
 from tracking.recordings.options import refuse_options
 from tracking.scoring import pooled
+from tracking.scoring.conditions import conditions
 from tracking.stats import SURE
 
 

@@ -19,7 +19,7 @@ from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 from tracking.app.score_tables import checked_key, figure, table
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.stats import FEWEST, mean_interval
+from tracking.stats import FEWEST, few, mean_interval
 from tracking.stress.axes import Axis, BreakingPoint, parse_axes, shares
 from tracking.stress.scene_player import Store, contender, scene_player
 from tracking.stress.sweep import Plan, Sweep, generate_command
@@ -258,7 +258,7 @@ def _break_lines(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
         elif sweep.seeds == len(sweep.plan.seeds):
             yield "all seeds are played: wide intervals need more --seeds"
     scenes = min((count for curve in curves.values() for count in curve["scenes"]), default=0)
-    if scenes < FEWEST:
+    if few(scenes):
         yield f"fewer than {FEWEST} scenes: intervals are indicative"
 
 
