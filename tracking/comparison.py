@@ -40,6 +40,7 @@ class ComparedSequence:
     scores: list[Scores]  # of each run
     inputs: list[str]  # what each run got, in few words
     given: list[str]  # the same with background and settings of the sensor; "" without run.json
+    detections: list[str | None]  # hash of the stored ones that it got, None if it got no stored ones, "" if unknown
     oracles: Mapping[str, Scores]  # by input; if no run says what it got, of the stored detections, else of the labels
     blocks: Mapping[str, Ranking] | None = None  # by score, the ranking with intervals by weights of blocks of frames
     seconds: float = 0.0  # length of the sequence
@@ -238,7 +239,8 @@ def compare_one(
     own = dict(zip(best, found, strict=False))
     named, summaries = [name or UNKNOWN for name in inputs], [input_summary(info) for info in infos]
     seconds = scorer.truth.length / scorer.truth.fps
-    return ComparedSequence(found[len(best) :], named, summaries, own, drawn, seconds)
+    stored = [info.get("detections_hash", "") for info in infos]
+    return ComparedSequence(found[len(best) :], named, summaries, stored, own, drawn, seconds)
 
 
 @contextmanager

@@ -83,6 +83,8 @@ def scoring_notes(sequences: list[Sequence], found: list[ComparedSequence]) -> l
     if any(left):
         rules = "by the labels (on distractors, in ignored regions or too low)"
         notes.append(f"{', '.join(map(str, left))} tracked boxes are left out {rules}")
+    if any(len({*filter(None, one.detections)}) > 1 for one in found):
+        notes.append("the runs got different stored detections: the oracle got those of TRUTH")
     seconds = scores[0].length / sequences[0].fps
     if found[0].blocks is not None and seconds < SURE:
         notes.append(f"intervals are indicative under {SURE:g} s: the recording lasts {seconds:.4g} s")

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.hashing import installed
+from sim.hashing import detections_hash, installed
 from sim.types import DetectionMode, Sequence, Tracker, Tracks
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
 from tracking.running import image_scale
@@ -53,12 +53,15 @@ def run_info(
     """
     sample = prepared.context.background
     begins = 1 if sample is None else causal_from(prepared.sequence)
-    diagnostics = prepared.diagnostics("after the last frame")
+    diagnostics, stored = prepared.diagnostics("after the last frame"), None
+    if prepared.mode == "file" and prepared.given is not None:
+        stored = detections_hash(prepared.given.detections)
     return {
         "tracker": prepared.name,
         "config": prepared.config.as_dict() if prepared.config else {},
         "seed": seed,
         "detections": prepared.mode,
+        "detections_hash": stored,
         "input": prepared.input,
         "sensor": dict(sensor),
         "background": None if sample is None else prepared.sequence.source.get("background", f"{len(sample)} frames"),
@@ -305,7 +308,7 @@ def group(
     if run is None:
         kind = "boxes" if len(tracks) and tracks[0].plane == "image" else "points"
         info = {"tracker": "group", "config": {}, "seed": None, "detections": "truth", "input": kind, **info}
-        info |= {"sensor": {}, "background": None}
+        info |= {"detections_hash": None, "sensor": {}, "background": None}
     else:
         info = {**run.info, **{key: info[key] for key in OF_TRACKS}}
     at_end = events_at_end(people, tracks, sequence.fps)

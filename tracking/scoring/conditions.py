@@ -14,8 +14,8 @@ from tracking.scoring.catalogue import SCORER
 
 # The keys of a sequence's scores that are no scores, but decide them.
 CONDITIONS = (
-    "scorer", "similarity", "surface", "group_match", "given", "frames_scored", "label_step", "px_per_m", "camera",
-    "unscored", "truth",
+    "scorer", "similarity", "surface", "group_match", "given", "detections", "frames_scored", "label_step", "px_per_m",
+    "camera", "unscored", "truth",
 )  # fmt: skip
 DIGITS = 9  # Decimals that count of a camera, whose last bits depend on the processor.
 

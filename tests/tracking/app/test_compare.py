@@ -11,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.gate import false_regressions
+from tests.processes import FAKE
 from tests.refusals import refused
 from tracking.app.cli import run
 from tracking.app.commands.compare import judged
@@ -290,3 +291,26 @@ def test_another_way_of_scoring_is_in_the_file(options, key, tmp_path, capsys):
     line = refused(capsys, "compare", *files)
     assert f": {key}: got" in line
     assert "in the same way" in line
+
+
+@pytest.mark.parametrize("tracker", [FAKE, "blob"])
+def test_runs_from_other_detections_are_not_compared(tracker, tmp_path, capsys):
+    """The same labels and mode; in the second folder the detector found everybody, in the third as in the first."""
+    rows = [(f, i, 100 + 10 * f + 200 * i, 100, 40, 120) for f in range(1, 31) for i in (1, 2)]
+    found = [row for row in rows if row[0] % 3]
+    files, truth = [], tmp_path / "a" / "sequence"
+    for name, detected in (("a", found), ("b", rows), ("c", found)):
+        folder = tmp_path / name / "sequence"
+        for text, lines in (("gt", rows), ("det", [(f, -1, *box) for f, _, *box in detected])):
+            (folder / text).mkdir(parents=True)
+            table = "".join(",".join(map(str, (*row, 1, -1, -1, -1))) + "\n" for row in lines)
+            (folder / text / f"{text}.txt").write_text(table)
+        assert run(["track", tracker, str(folder), "--out", str(tmp_path / f"run-{name}")]) == 0
+        capsys.readouterr()
+        assert run(["score", str(truth), str(tmp_path / f"run-{name}"), "--json"]) == 0
+        files.append(tmp_path / f"{name}.json")
+        files[-1].write_text(capsys.readouterr().out)
+    assert "sequence: detections: got '" in refused(capsys, "compare", *files[:2])
+    assert verdicts(capsys, files[0], files[2])[1]["scores"][0]["verdict"] == "too few"
+    assert run(["score", str(truth), str(tmp_path / "run-a"), str(tmp_path / "run-b")]) == 0
+    assert "the runs got different stored detections: the oracle got those of TRUTH" in capsys.readouterr().out

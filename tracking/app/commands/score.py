@@ -70,10 +70,11 @@ def _run_result(sequences: list[Sequence], found: list[ComparedSequence]) -> Com
             {
                 **conditions(sequence),
                 "name": name, "similarity": s.similarity, "surface": s.surface, "group_match": s.group_match,
-                "given": words, "frames_scored": s.frames, "label_step": s.step, "left_out": s.left_out, **s,
+                "given": one.given[0], "detections": one.detections[0], "frames_scored": s.frames,
+                "label_step": s.step, "left_out": s.left_out, **s,
                 "truth": tracked_hash(sequence),
             }
-            for sequence, (name, s), words in zip(sequences, rows, given, strict=True)
+            for sequence, (name, s), one in zip(sequences, rows, found, strict=True)
         ],
         "mean": None if mixed else means, "pooled": None if mixed else together, "notes": notes,
     }  # fmt: skip

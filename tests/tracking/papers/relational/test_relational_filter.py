@@ -189,8 +189,8 @@ def test_who_is_only_predicted_is_not_seen(kind):
 @pytest.mark.parametrize("seed", range(5))
 @pytest.mark.parametrize(("apart", "least", "most"), [(9.0, 8, 8), (0.7, 18, 21)])
 def test_a_missed_person_is_reported_while_probably_there_and_longer_beside_a_partner(apart, least, most, seed):
-    """For m s while exp(-m / 0.3), hidden once a second, is above a / 15, gone once in 15 s. a is the share of particles
-    without a seen partner: 1 if alone, up to m = 0.81 s, and 1.8 s if it is below 0.037."""
+    """For m s while exp(-m / 0.3), hidden once a second, is above a / 15, gone once in 15 s. a is the share of
+    particles without a seen partner: 1 if alone, up to m = 0.81 s, and 1.8 s if it is below 0.037."""
     walk = [[(0.1 * k, 0.0), (0.1 * k, apart)] for k in range(51)]
     tracker = Relational()
     tracks = stepped(tracker, [*walk[:30], *[people[:1] for people in walk[30:50]], None, walk[50]], seed)
