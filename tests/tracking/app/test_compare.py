@@ -183,6 +183,13 @@ def test_rounding_of_another_processor_is_no_difference(tmp_path, capsys):
     assert (code, found["scores"][0]["verdict"]) == (0, "no difference")
 
 
+def twice(path: str) -> str:
+    """A file with a score twice, as a merge of two versions can leave it."""
+    text = Path(path).read_text()
+    Path(path).write_text(text.replace('"objective"', '"HOTA": 0.9, "HOTA": 0.5, "objective"', 1))
+    return path
+
+
 NOT_COMPARED = [
     (lambda p: stored(p, np.append(BASE, 0.5)), "other sequences: got s6, not in"),
     (lambda p: str(p.parent), "no scores of sequences; expected a file of `flockscope score --json`"),
@@ -197,6 +204,7 @@ NOT_COMPARED = [
     (lambda p: changed(stored(p, BASE), 1, objective=[0.5]), "s1: objective: got [0.5]"),
     (lambda p: changed(stored(p, BASE), 1, objective=float("nan")), "NaN, which is no number of JSON"),
     (lambda p: changed(stored(p, BASE), 1, objective=-float("inf")), "-Infinity, which is no number of JSON"),
+    (lambda p: twice(stored(p, BASE)), "the key 'HOTA' twice in an object"),
 ]
 
 
