@@ -197,7 +197,8 @@ def track(
     """Tracks every frame of a sequence, and derives groups and events if the tracker reports none.
 
     Warns with a UserWarning if `grouping` has no effect because the tracker reports groups itself. Warns, too, if the
-    tracker reports groups only after its first frame with people; such groups are replaced by derived ones.
+    tracker reports groups only after its first frame with people; such groups are replaced by derived ones. Warns, too,
+    if each reported group has one member.
 
     Args:
         tracker: A registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
@@ -224,7 +225,7 @@ def track(
     """
     from sim.compiler import clock
     from tracking.grouping.foot_points import completed
-    from tracking.grouping.grouped_tracks import events_at_end, late_groups, names_groups
+    from tracking.grouping.grouped_tracks import events_at_end, groups_alone, late_groups, names_groups
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     rule = chosen or default_grouping()
@@ -253,6 +254,8 @@ def track(
             f"{prepared.name}: names groups from frame {late} on, but not in its first answer with people: its "
             "groups are replaced by derived ones. Report groups = Groups.none() as long as there is no group"
         )
+    if named and groups_alone(reported):
+        odd.append(f"{prepared.name}: each of its groups has one member. Give group -1 to people who are alone")
     for text in odd:
         warnings.warn(text, UserWarning, stacklevel=2)
     speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
