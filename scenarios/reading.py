@@ -13,6 +13,7 @@ import stat
 import tomllib
 from collections.abc import Callable
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -31,7 +32,7 @@ def parse_toml(text: str, file: object = "") -> dict[str, Any]:
 
 def parse_json(text: str, file: object = "", remedy: str = "correct the file") -> Any:
     """Returns the value in a JSON text; raises InputError, which names `file` and `remedy`, if it is not valid."""
-    return _parsed(partial(json.loads, parse_constant=_constant), text, file, "JSON", remedy)
+    return _parsed(partial(json.loads, parse_constant=_constant, object_pairs_hook=_object), text, file, "JSON", remedy)
 
 
 def _parsed(load: Callable[[str], Any], text: str, file: object, form: str, remedy: str) -> Any:
@@ -48,6 +49,14 @@ def _parsed(load: Callable[[str], Any], text: str, file: object, form: str, reme
         raise InputError(file=file, place=place, got=got, expected=form, remedy=remedy) from None
     _require_plain(value, file)
     return value
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        twice = next(a for a, b in pairwise(sorted(key for key, _ in pairs)) if a == b)
+        raise ValueError(f"the key {twice!r} twice in an object")
+    return found
 
 
 def _constant(word: str) -> NoReturn:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.types import Truth
+from sim.types import Detections, Truth
 
 # Raise this whenever the same scenario and seed give another truth or other detections; golden hashes check that.
 ENGINE = 6
@@ -77,6 +77,15 @@ def labels_hash(truth: Truth) -> str:
     """
     read = (truth.frame, truth.id, truth.group, truth.pos, truth.box)
     return canonical_hash(("labels", truth.fps, truth.length, *read))
+
+
+def detections_hash(detections: Iterable[Detections | None]) -> str:
+    """Returns the SHA-256 (64 hex digits) of the detections of each frame: boxes (positions without boxes) and scores.
+
+    Positions that follow from boxes and a camera do not count: their last bits depend on the processor.
+    """
+    read = ((d.pos if d.box is None else d.box, d.score) if d is not None else None for d in detections)
+    return canonical_hash(("detections", [*read]))
 
 
 def content_hash(truth: str, detections: Any, pixels: Mapping[str, str] | None = None) -> str:

@@ -17,7 +17,7 @@ LINES = 500
 # What scoring may import of ours: people use it alone, on their own arrays.
 SCORING = (
     "scenarios.limits", "tracking.scoring", "tracking.grouping.grouped_tracks", "tracking.grouping.foot_points",
-    "scenarios.errors", "sim.arrays", "sim.types", "sim.place", "sim.truth.group_hulls",
+    "scenarios.errors", "sim.arrays", "sim.hashing", "sim.types", "sim.place", "sim.truth.group_hulls",
     "sim.truth.crossing_events", "sim.truth.queue_detection", "sim.geometry.boxes", "sim.geometry.polygons",
     "sim.scene.camera", "sim.scene.standing", "sim.scene.terrain",
 )  # fmt: skip

@@ -24,7 +24,7 @@ from tracking.scoring.evaluation import Scorer, Scores
 from tracking.scoring.group_scores import GroupMatch
 from tracking.scoring.people_comparison import IncomparableError, Similarity
 from tracking.scoring.pooled_scores import pooled
-from tracking.stats import FEWEST, SURE, mean_of_finite
+from tracking.stats import SURE, few, mean_of_finite
 
 if TYPE_CHECKING:
     import pyarrow
@@ -40,6 +40,7 @@ class ComparedSequence:
     scores: list[Scores]  # of each run
     inputs: list[str]  # what each run got, in few words
     given: list[str]  # the same with background and settings of the sensor; "" without run.json
+    detections: list[str | None]  # hash of the stored ones that it got, None if it got no stored ones, "" if unknown
     oracles: Mapping[str, Scores]  # by input; if no run says what it got, of the stored detections, else of the labels
     blocks: Mapping[str, Ranking] | None = None  # by score, the ranking with intervals by weights of blocks of frames
     seconds: float = 0.0  # length of the sequence
@@ -99,7 +100,7 @@ class ComparedRuns:
         have it, or of a recording shorter than a minute."""
         if self.blocks is not None:
             return self.seconds < SURE
-        return self.ranking(key).sequences < FEWEST
+        return bool(few(self.ranking(key).sequences))
 
     def to_arrow(self, key: str = "objective") -> pyarrow.Table:
         """Returns the ranking by a score as a table, one row per run, best first, after the oracles.
@@ -124,7 +125,7 @@ class ComparedRuns:
             ends = np.concatenate([*(getattr(one, part) for one in of_oracles), getattr(ranking, part)])
             columns[part] = CATALOGUE[key].within(ends).tolist()
         of_runs = [self.indicative(key)] * len(names)
-        columns["indicative"] = [*(one.sequences < FEWEST for one in of_oracles), *of_runs]
+        columns["indicative"] = [*(bool(few(one.sequences)) for one in of_oracles), *of_runs]
         for each in CATALOGUE:
             means = [mean_of_finite(_values(rows[name], each)) for name in columns["run"]]
             if np.isfinite(means).any():
@@ -238,7 +239,8 @@ def compare_one(
     own = dict(zip(best, found, strict=False))
     named, summaries = [name or UNKNOWN for name in inputs], [input_summary(info) for info in infos]
     seconds = scorer.truth.length / scorer.truth.fps
-    return ComparedSequence(found[len(best) :], named, summaries, own, drawn, seconds)
+    stored = [info.get("detections_hash", "") for info in infos]
+    return ComparedSequence(found[len(best) :], named, summaries, stored, own, drawn, seconds)
 
 
 @contextmanager

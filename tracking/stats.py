@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from math import ceil, sqrt
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
-from sim.types import Array, Ints
+from sim.types import Array, Bools, Ints
 from tracking.scoring.catalogue import Score
 
 DRAWS = 2000  # Draws of weights, or bootstrap samples.
@@ -78,8 +78,12 @@ def compared(differences: Array, comparisons: int = 1) -> tuple[Array, Array, Ar
     0 and at least `FEWEST` differences are finite, else 0.
     """
     mean, low, high = mean_interval(differences, joint_level(comparisons))
-    enough = np.isfinite(differences).sum(axis=0) >= FEWEST
-    return mean, low, high, np.where(enough, sign_of(low, high), 0)
+    return mean, low, high, np.where(few(np.isfinite(differences).sum(axis=0)), 0, sign_of(low, high))
+
+
+def few(sequences: Ints | int) -> Bools:
+    """Returns True where an interval of so many sequences is only indicative: where its side of 0 is never sure."""
+    return np.asarray(sequences) < FEWEST
 
 
 def sign_of(low: Array, high: Array) -> Ints:
@@ -160,7 +164,7 @@ def block_weights(frames: int, block: int, draws: int, r: np.random.Generator) -
     return np.asarray(weights[:, :frames] + weights[:, frames:-1])
 
 
-def score_interval(score: Score, values: Array, difference: bool = False) -> dict[str, Array]:
+def score_interval(score: Score, values: Array, difference: bool = False) -> dict[str, Any]:
     """Returns "mean", "low" and "high" as `mean_interval` does, cut at the range of the score, and "indicative", (K,)
     each.
 
@@ -168,4 +172,4 @@ def score_interval(score: Score, values: Array, difference: bool = False) -> dic
     differences of the score.
     """
     mean, low, high = (score.within(end, difference) for end in mean_interval(values))
-    return {"mean": mean, "low": low, "high": high, "indicative": np.isfinite(values).sum(axis=0) < FEWEST}
+    return {"mean": mean, "low": low, "high": high, "indicative": few(np.isfinite(values).sum(axis=0))}

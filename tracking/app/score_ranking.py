@@ -28,7 +28,7 @@ from tracking.app.score_tables import (
 )
 from tracking.comparison import MATCHED, ComparedRuns, ComparedSequence, joined
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.stats import FEWEST, SURE, mean_of_known
+from tracking.stats import FEWEST, SURE, few, mean_of_known
 
 COLUMNS = ("HOTA", "MOTA", "IDF1", "group_F1", "pairwise_F1", "event_F1")  # Scores beside the one that ranks.
 LONGEST_NAME = 40  # Characters of an input or run that a table shows at most.
@@ -83,6 +83,8 @@ def scoring_notes(sequences: list[Sequence], found: list[ComparedSequence]) -> l
     if any(left):
         rules = "by the labels (on distractors, in ignored regions or too low)"
         notes.append(f"{', '.join(map(str, left))} tracked boxes are left out {rules}")
+    if any(len({*filter(None, one.detections)}) > 1 for one in found):
+        notes.append("the runs got different stored detections: the oracle got those of TRUTH")
     seconds = scores[0].length / sequences[0].fps
     if found[0].blocks is not None and seconds < SURE:
         notes.append(f"intervals are indicative under {SURE:g} s: the recording lasts {seconds:.4g} s")
@@ -96,14 +98,14 @@ def differences(c: ComparedRuns, key: str, by: str) -> list[dict[str, Any]]:
     "run" surely is so, else False.
     """
     found, places = c.ranking(key), {k: place for place, k in enumerate(c.ranking(key).order.tolist())}
-    rows, few = [], c.indicative(key)
+    rows, indicative = [], c.indicative(key)
     for one, other in combinations(c.ranking(by).order.tolist(), 2):
         i, j = places[one], places[other]
         sure = "better" if found.better[i, j] else "worse" if found.better[j, i] else False
         ends = {"mean": found.less, "low": found.less_low, "high": found.less_high}
         cut = CATALOGUE[key].within
         values = {end: float(cut(part[i, j], difference=True)) for end, part in ends.items()}
-        rows.append({"run": c.runs[one], "minus": c.runs[other], **values, "sure": sure, "indicative": few})
+        rows.append({"run": c.runs[one], "minus": c.runs[other], **values, "sure": sure, "indicative": indicative})
     return rows
 
 
@@ -227,14 +229,14 @@ def _score_differences(every: RankedRuns, pair: Mapping[str, Mapping[str, Any]])
 def _difference_table(title: str, first: str, rows: Mapping[str, tuple[str, Mapping[str, Any]]], foot: str = "") -> str:
     cells = []
     for name, (key, d) in rows.items():
-        few = "indicative" if d["indicative"] and math.isfinite(d["low"]) else ""
-        sure = f"surely {d['sure']}" if d["sure"] else few  # of the run named first
+        words = "indicative" if d["indicative"] and math.isfinite(d["low"]) else ""
+        sure = f"surely {d['sure']}" if d["sure"] else words  # of the run named first
         cells.append([name, number(key, d["mean"], mean=True), interval(key, d), sure])
     return table(title, [first], ["difference", "95 % interval"], cells, [""], foot)
 
 
 def _can_be_sure(comparison: ComparedRuns, key: str) -> bool:
-    return comparison.blocks is not None or comparison.ranking(key).sequences >= FEWEST
+    return comparison.blocks is not None or not few(comparison.ranking(key).sequences)
 
 
 def verdict(comparison: ComparedRuns, key: str) -> list[str]:

@@ -85,6 +85,12 @@ def _has_groups(tracks: Tracks) -> bool:
     return tracks.unit == "group" or tracks.groups is not None or bool((tracks.group >= 0).any())
 
 
+def groups_alone(tracks: Sequence[Tracks]) -> bool:
+    """Returns True if people are in groups in some frame, but no two of them in the same group in any."""
+    grouped = [t.group[t.group >= 0] for t in tracks if t.unit == "person" and t.groups is None]
+    return any(map(len, grouped)) and all(len(group) == len({*group.tolist()}) for group in grouped)
+
+
 def without_groups(tracks: Sequence[Tracks]) -> list[Tracks]:
     """Returns the tracks with groups and events removed, and no kind of event as the tracker's own; `Tracks` of whole
     groups are returned unchanged."""

@@ -6,7 +6,7 @@ rows, and half of all, fit, only positions on the ground are looked at, in every
 from the detections on the ground, and at the px of detections in the image. A tracker that loses its way is no fault.
 
 A row fits if
-- its position lies on the ground near the detections of the frames so far (GROUND), or in the image at most a person's
+- its position lies on the ground near one of the last detections (GROUND, LAST), or in the image at most a person's
   height from a detection; without a camera, positions on the ground are not the px of detections,
 - its box overlaps that of a detection, if both have boxes,
 - its box is of a person at its position, if a camera is known; in the image, its position lies in its box,
@@ -30,7 +30,8 @@ from sim.types import Array, Bools, Context, Detections, Tracks
 FITTING, COMPARED = 3, 12  # rows that end the check, and rows of which hardly any may be wrong
 AGAIN = 10  # frames between looks at later positions
 SHARE = 0.2  # of the rows compared that must fit
-GROUND = 20.0  # m: how far from the detections a person may be
+GROUND = 5.0  # m: how far from the nearest detection a person may be
+LAST = 200  # detections on the ground that are kept
 OVERLAP = 0.05  # least IoU of a box and the box of a body at the position
 GIVEN = 0.25  # least IoU of a box and a detection; .14 if a middle is taken for a corner
 VIEW = 1.0  # widths and heights of the picture by which a person may be outside it
@@ -40,23 +41,22 @@ VIEW = 1.0  # widths and heights of the picture by which a person may be outside
 class PlaneCheck:
     """The comparison of a tracker's first answers with its input in one sequence.
 
-    State: compared, fitting, numbers of rows; low, high (2,): corners of the detections on the ground so far, m.
+    State: compared, fitting, numbers of rows; points (K, 2): the last detections on the ground, m.
     """
 
     compared: int = 0
     fitting: int = 0
-    low: Array = field(default_factory=lambda: np.full(2, np.inf))
-    high: Array = field(default_factory=lambda: np.full(2, -np.inf))
+    points: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
     def clear(self) -> None:
         """Forgets everything, for the start of another sequence."""
         self.compared = self.fitting = 0
-        self.low, self.high = np.full(2, np.inf), np.full(2, -np.inf)
+        self.points = np.zeros((0, 2))
 
     def check(self, t: Tracks, given: Detections | None, context: Context, tracker: str, sequence: str) -> None:
         """Compares the answer of a frame. Raises WorkError if the answers so far lie elsewhere than they say."""
         later = self.fitting >= max(FITTING, self.compared / 2)
-        if later and (t.index % AGAIN or given is None or t.plane != "ground" or not np.isfinite(self.low).all()):
+        if later and (t.index % AGAIN or given is None or t.plane != "ground" or not len(self.points)):
             return
         fits = None if not len(t.id) else self._near(t, given, context) if later else self._fits(t, given, context)
         if fits is None:
@@ -72,7 +72,7 @@ class PlaneCheck:
             place, got = f"{sequence}, frame {t.index}", _words(t, int(np.argmin(fits)))
             remedy = (
                 "report what is tracked in px by Tracks.of_boxes (left, top, width, height) or with "
-                'plane="image", and what is tracked in m with plane="ground"'
+                'plane="image", and what is tracked in m with plane="ground", x and y as the detections have them'
             )
             raise WorkError(file=tracker, place=place, got=got, expected=self._expected(t, given), remedy=remedy)
 
@@ -95,15 +95,14 @@ class PlaneCheck:
                 return None
             points = standing_points(given.box, context.camera, context.scene)
         points = points[np.isfinite(points).all(axis=1)]
-        self.low, self.high = np.vstack([points, self.low]).min(axis=0), np.vstack([points, self.high]).max(axis=0)
-        if not np.isfinite(self.low).all():
+        self.points = np.vstack([self.points, points])[-LAST:]
+        if not len(self.points):
             return None
-        pos = t.pos[:, :2]
-        return np.asarray(((pos > self.low - GROUND) & (pos < self.high + GROUND)).all(axis=1))
+        return np.asarray(np.abs(t.pos[:, None, :2] - self.points).max(axis=2).min(axis=1) < GROUND)
 
     def _expected(self, t: Tracks, given: Detections | None) -> str:
-        if t.plane != "image" and np.isfinite(self.low).all():
-            (x, y), (far_x, far_y) = self.low, self.high
+        if t.plane != "image" and len(self.points):
+            (x, y), (far_x, far_y) = self.points.min(axis=0), self.points.max(axis=0)
             return f"people in m near the detections, which lie at x {x:.1f} to {far_x:.1f}, y {y:.1f} to {far_y:.1f}"
         if given is not None and given.box is not None and len(given.box):
             return (

@@ -24,6 +24,7 @@ from sim.types import Context, DetectionMode, Frame, Ints, Sequence, Tracker, Tr
 from tracking.config import Config
 from tracking.running import image_scale, tracker_registry
 from tracking.running.detection_mode import (
+    Given,
     InputKind,
     as_frames,
     as_needed,
@@ -56,6 +57,7 @@ class PreparedTracker:
     sequence: Sequence
     # with detections and without pictures; None: the sequence's own frames (mode "image")
     frames_given: tuple[Frame, ...] | None
+    given: Given | None = None  # the detections before the tracker's needs chose from them; None as frames_given
     scale_frames: int = 0  # as of ImageScale
     history: ReportHistory = field(default_factory=ReportHistory)  # what the tracker has reported since `reset`
     planes: PlaneCheck = field(default_factory=PlaneCheck)  # the same, compared with its input
@@ -188,7 +190,7 @@ def prepare(
     frames, scale = given.frames, given.scale
     background = sequence.background() if mode == "image" else None
     context = Context(sequence.fps, scale.px_per_m, sequence.camera, sequence.scene, sequence.image_size, background)
-    return PreparedTracker(name, instance, config, context, mode, sequence, frames, scale.frames)
+    return PreparedTracker(name, instance, config, context, mode, sequence, frames, given, scale.frames)
 
 
 def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> tuple[str, Tracker, Config | None]:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.hashing import installed
+from sim.hashing import detections_hash, installed
 from sim.types import DetectionMode, Sequence, Tracker, Tracks
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
 from tracking.running import image_scale
@@ -53,12 +53,15 @@ def run_info(
     """
     sample = prepared.context.background
     begins = 1 if sample is None else causal_from(prepared.sequence)
-    diagnostics = prepared.diagnostics("after the last frame")
+    diagnostics, stored = prepared.diagnostics("after the last frame"), None
+    if prepared.mode == "file" and prepared.given is not None:
+        stored = detections_hash(prepared.given.detections)
     return {
         "tracker": prepared.name,
         "config": prepared.config.as_dict() if prepared.config else {},
         "seed": seed,
         "detections": prepared.mode,
+        "detections_hash": stored,
         "input": prepared.input,
         "sensor": dict(sensor),
         "background": None if sample is None else prepared.sequence.source.get("background", f"{len(sample)} frames"),
@@ -194,7 +197,8 @@ def track(
     """Tracks every frame of a sequence, and derives groups and events if the tracker reports none.
 
     Warns with a UserWarning if `grouping` has no effect because the tracker reports groups itself. Warns, too, if the
-    tracker reports groups only after its first frame with people; such groups are replaced by derived ones.
+    tracker reports groups only after its first frame with people; such groups are replaced by derived ones. Warns, too,
+    if each reported group has one member.
 
     Args:
         tracker: A registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
@@ -221,7 +225,7 @@ def track(
     """
     from sim.compiler import clock
     from tracking.grouping.foot_points import completed
-    from tracking.grouping.grouped_tracks import events_at_end, late_groups, names_groups
+    from tracking.grouping.grouped_tracks import events_at_end, groups_alone, late_groups, names_groups
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     rule = chosen or default_grouping()
@@ -250,6 +254,8 @@ def track(
             f"{prepared.name}: names groups from frame {late} on, but not in its first answer with people: its "
             "groups are replaced by derived ones. Report groups = Groups.none() as long as there is no group"
         )
+    if named and groups_alone(reported):
+        odd.append(f"{prepared.name}: each of its groups has one member. Give group -1 to people who are alone")
     for text in odd:
         warnings.warn(text, UserWarning, stacklevel=2)
     speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
@@ -305,7 +311,7 @@ def group(
     if run is None:
         kind = "boxes" if len(tracks) and tracks[0].plane == "image" else "points"
         info = {"tracker": "group", "config": {}, "seed": None, "detections": "truth", "input": kind, **info}
-        info |= {"sensor": {}, "background": None}
+        info |= {"detections_hash": None, "sensor": {}, "background": None}
     else:
         info = {**run.info, **{key: info[key] for key in OF_TRACKS}}
     at_end = events_at_end(people, tracks, sequence.fps)

@@ -42,7 +42,7 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import Setting, did_you_mean
 from sim.types import Array, Bools
-from tracking.stats import FEWEST, joint_level, mean_interval
+from tracking.stats import few, joint_level, mean_interval
 
 Settings = Callable[[float], list[Setting]]  # value: the settings of a scenario
 NEVER = np.inf
@@ -222,6 +222,6 @@ def frontier(way: Array, scores: Array, best: Array, limit: float) -> Frontier:
     ends = mean_interval(height, joint_level(height.shape[1]))
     mean, low, high = (end.reshape(-1, len(way)) for end in ends)
     sides = np.where(low > 0, 1, np.where(high < 0, -1, 0))
-    enough = np.isfinite(height).sum(axis=0).reshape(mean.shape) >= FEWEST
+    unsure = few(np.isfinite(height).sum(axis=0).reshape(mean.shape))
     points = tuple(BreakingPoint(*(crossing(way, end[k]) for end in (mean, low, high))) for k in range(len(mean)))
-    return Frontier(np.where(enough, sides, 0), mean > 0, points)
+    return Frontier(np.where(unsure, 0, sides), mean > 0, points)

@@ -141,6 +141,11 @@ class Sweep:
         for k, axis in enumerate(plan.axes):
             hard = (*easy[:k], axis.hard, *easy[k + 1 :])
             (other, *_) = sources(plan.scenarios, plan.seeds[:1], plan.settings_at(hard))
+            if plan.detections != "file" and all(key_of(text).startswith("sensor.") for text in axis.settings(0)):
+                raise InputError(
+                    place="--vary", got=axis.name, expected="an axis that changes the scenes",
+                    remedy=f"--detections {plan.detections} does not use [sensor]: leave it out, or vary other keys",
+                )  # fmt: skip
             if plan.detections != "image" and _content(first) == _content(other):
                 raise InputError(
                     place="--vary", got=axis.name, expected="an axis that changes the scenes",
@@ -339,9 +344,14 @@ class Sweep:
         return more > 0
 
 
+def key_of(setting: str) -> str:
+    """Returns the key of a setting "key=value"."""
+    return setting.partition("=")[0].strip()
+
+
 def last_of_each_key(settings: Iterable[str]) -> tuple[str, ...]:
     """Returns the settings "key=value" with each key once: the last value of a key counts."""
-    return tuple({text.partition("=")[0].strip(): text for text in settings}.values())
+    return tuple({key_of(text): text for text in settings}.values())
 
 
 def generate_command(scenario: str, seed: int, settings: Iterable[str], out: str) -> str:

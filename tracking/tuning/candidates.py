@@ -26,7 +26,7 @@ from sim.dataset.generate import LEFT_OUT
 from tracking.config import Config
 from tracking.episodes.episode import Episode, Source
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.stats import FEWEST, mean_of_known, paired
+from tracking.stats import few, mean_of_known, paired
 
 if TYPE_CHECKING:
     import optuna
@@ -110,14 +110,14 @@ class Comparison:
     def verdict(self) -> str:
         """How `after` compares: "better" or "worse" if the interval over at least 6 sequences excludes 0, else "no sure
         difference"."""
-        if self.sequences < FEWEST or not (self.low > 0 or self.high < 0):
+        if self.indicative or not (self.low > 0 or self.high < 0):
             return "no sure difference"
         return "better" if (self.difference > 0) == self.higher else "worse"
 
     @property
     def indicative(self) -> bool:
         """True if the interval is only indicative: of fewer than 6 sequences."""
-        return self.sequences < FEWEST
+        return bool(few(self.sequences))
 
     @property
     def difference_words(self) -> str:

@@ -130,7 +130,7 @@ def _why_defaults(candidates: list[Candidate], goal: Goal) -> list[str]:
     if not gains:
         return ["the defaults stay: no trial was better in training"]
     best = max(gains, key=lambda c: goal.gain(c.before, c.after))
-    if best.sequences < FEWEST:
+    if best.indicative:
         few = f"with {counted(best.sequences, 'validation scene')}, fewer than {FEWEST}, no gain is sure"
         return [f"the defaults stay: {few}; give more --validation seeds"]
     ends = f"{best.difference_words}, {counted(best.sequences, 'sequence')}"

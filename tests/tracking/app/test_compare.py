@@ -11,9 +11,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from benchmarks.gate import false_regressions
+from tests.processes import FAKE
 from tests.refusals import refused
 from tracking.app.cli import run
-from tracking.app.commands.compare import CONDITIONS, judged
+from tracking.app.commands.compare import judged
+from tracking.scoring.conditions import CONDITIONS
 
 KEYS = ("objective", "IDSW")
 WAY = dict.fromkeys(CONDITIONS, "a") | {"label_step": 1, "px_per_m": None}
@@ -181,6 +183,13 @@ def test_rounding_of_another_processor_is_no_difference(tmp_path, capsys):
     assert (code, found["scores"][0]["verdict"]) == (0, "no difference")
 
 
+def twice(path: str) -> str:
+    """A file with a score twice, as a merge of two versions can leave it."""
+    text = Path(path).read_text()
+    Path(path).write_text(text.replace('"objective"', '"HOTA": 0.9, "HOTA": 0.5, "objective"', 1))
+    return path
+
+
 NOT_COMPARED = [
     (lambda p: stored(p, np.append(BASE, 0.5)), "other sequences: got s6, not in"),
     (lambda p: str(p.parent), "no scores of sequences; expected a file of `flockscope score --json`"),
@@ -195,6 +204,7 @@ NOT_COMPARED = [
     (lambda p: changed(stored(p, BASE), 1, objective=[0.5]), "s1: objective: got [0.5]"),
     (lambda p: changed(stored(p, BASE), 1, objective=float("nan")), "NaN, which is no number of JSON"),
     (lambda p: changed(stored(p, BASE), 1, objective=-float("inf")), "-Infinity, which is no number of JSON"),
+    (lambda p: twice(stored(p, BASE)), "the key 'HOTA' twice in an object"),
 ]
 
 
@@ -289,3 +299,26 @@ def test_another_way_of_scoring_is_in_the_file(options, key, tmp_path, capsys):
     line = refused(capsys, "compare", *files)
     assert f": {key}: got" in line
     assert "in the same way" in line
+
+
+@pytest.mark.parametrize("tracker", [FAKE, "blob"])
+def test_runs_from_other_detections_are_not_compared(tracker, tmp_path, capsys):
+    """The same labels and mode; in the second folder the detector found everybody, in the third as in the first."""
+    rows = [(f, i, 100 + 10 * f + 200 * i, 100, 40, 120) for f in range(1, 31) for i in (1, 2)]
+    found = [row for row in rows if row[0] % 3]
+    files, truth = [], tmp_path / "a" / "sequence"
+    for name, detected in (("a", found), ("b", rows), ("c", found)):
+        folder = tmp_path / name / "sequence"
+        for text, lines in (("gt", rows), ("det", [(f, -1, *box) for f, _, *box in detected])):
+            (folder / text).mkdir(parents=True)
+            table = "".join(",".join(map(str, (*row, 1, -1, -1, -1))) + "\n" for row in lines)
+            (folder / text / f"{text}.txt").write_text(table)
+        assert run(["track", tracker, str(folder), "--out", str(tmp_path / f"run-{name}")]) == 0
+        capsys.readouterr()
+        assert run(["score", str(truth), str(tmp_path / f"run-{name}"), "--json"]) == 0
+        files.append(tmp_path / f"{name}.json")
+        files[-1].write_text(capsys.readouterr().out)
+    assert "sequence: detections: got '" in refused(capsys, "compare", *files[:2])
+    assert verdicts(capsys, files[0], files[2])[1]["scores"][0]["verdict"] == "too few"
+    assert run(["score", str(truth), str(tmp_path / "run-a"), str(tmp_path / "run-b")]) == 0
+    assert "the runs got different stored detections: the oracle got those of TRUTH" in capsys.readouterr().out

@@ -97,6 +97,20 @@ def test_a_budget_of_one_round_is_said(scene: str, capsys) -> None:
     assert "the budget ended in the first round" in Path("o/report.html").read_text()
 
 
+@pytest.mark.parametrize("axes", ["", "--vary detection --vary clutter"])
+def test_few_scenes_are_indicative_with_any_number_of_axes(axes: str, scene: str, capsys) -> None:
+    assert stress(scene, *axes.split(), "--episodes", "9", seeds="0:4") == 0
+    text = capsys.readouterr().out
+    assert "fewer than 6 scenes: intervals are indicative" in text
+    assert ("the budget ended in the first round" in text) == bool(axes)
+
+
+def test_an_axis_of_the_sensor_is_refused_where_pictures_are_tracked(scene: str, capsys) -> None:
+    options = ["--detections", "image", "--vary", "detection", "--suite", scene, "--seeds", "0:2", "--out", "o"]
+    assert run(["stress", "blob", *options]) == 2
+    assert "--detections image does not use [sensor]: leave it out, or vary other keys" in capsys.readouterr().err
+
+
 def test_a_found_scene_is_generated_by_its_command(scene: str, capsys) -> None:
     axes = ("--vary", "detection", "--vary", "clutter", "--vary", "velocity-difference")
     assert stress(scene, *axes, "--search", "6") == 0
@@ -118,6 +132,10 @@ WRONG_OPTIONS = [
     ("--vary noise --vary noise", "--vary: got noise twice"),
     ("--vary noise --search 5 --episodes 10", "--episodes: got it beside --search"),
     ("--detections image", "got a tracker that needs"),
+    ("--vary detection --set sensor.detect_prob=0.5", "--set sensor.detect_prob: got what --vary varies"),
+    ("--vary frame-rate --set scenario.camera.fps=5", "give the ends: --vary frame-rate=EASY:HARD"),
+    ("--vary noise --detections truth", "--vary: got noise; expected an axis that changes the scenes"),
+    ("--vary sensor.persistence=0:0.9 --detections truth --search 4", "--vary: got sensor.persistence"),
 ]
 
 

@@ -77,6 +77,8 @@ WRONG = {
     "shares of the picture": lambda f, d, i: Tracks.of_boxes(f, i, shares(d)),
     "shares of the picture, on the ground": lambda f, d, i: Tracks.of_points(f, i, d.pos, box=shares(d)),
     "centimetres": lambda f, d, i: Tracks.of_points(f, i, 100 * d.pos),
+    "feet": lambda f, d, i: Tracks.of_points(f, i, d.pos / 0.3048),
+    "axes of the other sign": lambda f, d, i: Tracks.of_points(f, i, -d.pos),
 }
 
 

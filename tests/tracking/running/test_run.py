@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -238,3 +240,20 @@ def test_groups_named_late_are_replaced_with_a_warning():
         run = track(Naming, standing(90))
     assert run[40].group.tolist() == run[80].group.tolist() == [1, 1]
     assert "grouping" in run.info
+
+
+def test_groups_of_one_are_warned_of():
+    """A tracker that gives people who are alone a group of their own has no group that counts; its remedy works."""
+
+    class OwnGroup(NamingAlways):
+        alone = np.arange(2)
+
+        def step(self, frame, detections):
+            return super().step(frame, detections).replace(group=self.alone, groups=None, events=())
+
+    with pytest.warns(UserWarning, match="OwnGroup: each of its groups has one member. Give group -1"):
+        track(OwnGroup, standing(20))
+    OwnGroup.alone = np.full(2, -1)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert "grouping" in track(OwnGroup, standing(20)).info

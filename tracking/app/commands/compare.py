@@ -24,24 +24,17 @@ import numpy as np
 
 from scenarios.errors import InputError, counted, shortened
 from scenarios.limits import INTEGER, is_number
-from sim.hashing import canonical_hash
 from sim.store.atomic import write_file
 from sim.store.own_files import output_file
 from sim.store.tables import json_document, read_json
 from sim.types import Array, Bools
-from sim.types import Sequence as Recording
 from tracking.app.command_options import CompareOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.score_tables import checked_key, figure, table
-from tracking.scoring.catalogue import CATALOGUE, SCORER
-from tracking.stats import FEWEST, compared
+from tracking.scoring.catalogue import CATALOGUE
+from tracking.scoring.conditions import CONDITIONS
+from tracking.stats import FEWEST, compared, few
 
-# The keys of a sequence's scores that are no scores, but decide them: scores are compared only if these are equal.
-CONDITIONS = (
-    "scorer", "similarity", "surface", "group_match", "given", "frames_scored", "label_step", "px_per_m", "camera",
-    "unscored", "truth",
-)  # fmt: skip
-DIGITS = 9  # Decimals that count of a camera, whose last bits depend on the processor.
 UNDECIDED = {
     "too few": (f"at least {FEWEST} sequences with the score on both sides", "generate more seeds"),
     "too noisy": ("an interval within the tolerance, or off 0", "score more sequences, or give a larger --tolerance"),
@@ -84,21 +77,6 @@ def compare(options: CompareOptions) -> CommandResult:
         data["error"], code = error.as_dict(), 2
         lines.append(f"undecided: {error.line()}")
     return CommandResult(data, "\n".join(lines), code)
-
-
-def conditions(sequence: Recording) -> dict[str, Any]:
-    """Returns the scorer's number, and what options of the source change in the truth; large parts as hashes."""
-    truth, camera = sequence.truth, sequence.camera
-    assert truth is not None
-    view = None
-    if camera is not None:
-        numbers = (camera.focal_px, camera.centre_px, camera.position, camera.rotation.ravel(), camera.radial)
-        view = (camera.kind, camera.image, np.round(np.hstack(numbers), DIGITS) + 0.0, sequence.scene)
-    rules = (truth.labelled, truth.unscored, truth.visibility, truth.truncation)
-    return {
-        "scorer": SCORER, "px_per_m": round(truth.px_per_m, DIGITS), "camera": view and canonical_hash(view)[:16],
-        "unscored": canonical_hash(rules)[:16],
-    }  # fmt: skip
 
 
 def _check_score(key: str, others: Sequence[str], tolerance: float) -> None:
@@ -196,7 +174,7 @@ def judged(
         better, sure = mean[k] * upwards[k], sign[k] * upwards[k]
         if lost.any() or (sure < 0 and better < -tolerance):
             verdict = "regression"
-        elif both.sum() < FEWEST:
+        elif few(both.sum()):
             verdict = "too few"
         elif sure > 0 and better > tolerance:
             verdict = "improvement"

@@ -11,7 +11,6 @@ from sim.store.seal import tracked_hash
 from sim.types import Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.compare import conditions
 from tracking.app.score_ranking import ranked_runs, ranking_result, scoring_notes
 from tracking.app.score_tables import CSV_HEAD, checked_key, csv_bytes, summary, tables
 from tracking.app.scored_sequence import is_class, run_names, score_sequence, scoring_jobs
@@ -19,6 +18,7 @@ from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.comparison import ComparedSequence, check_blocks
 from tracking.recordings.options import refuse_options
 from tracking.scoring import pooled
+from tracking.scoring.conditions import conditions
 from tracking.stats import SURE
 
 
@@ -70,10 +70,11 @@ def _run_result(sequences: list[Sequence], found: list[ComparedSequence]) -> Com
             {
                 **conditions(sequence),
                 "name": name, "similarity": s.similarity, "surface": s.surface, "group_match": s.group_match,
-                "given": words, "frames_scored": s.frames, "label_step": s.step, "left_out": s.left_out, **s,
+                "given": one.given[0], "detections": one.detections[0], "frames_scored": s.frames,
+                "label_step": s.step, "left_out": s.left_out, **s,
                 "truth": tracked_hash(sequence),
             }
-            for sequence, (name, s), words in zip(sequences, rows, given, strict=True)
+            for sequence, (name, s), one in zip(sequences, rows, found, strict=True)
         ],
         "mean": None if mixed else means, "pooled": None if mixed else together, "notes": notes,
     }  # fmt: skip

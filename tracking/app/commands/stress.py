@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +19,10 @@ from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 from tracking.app.score_tables import checked_key, figure, table
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.stats import FEWEST, mean_interval
+from tracking.stats import FEWEST, few, mean_interval
 from tracking.stress.axes import Axis, BreakingPoint, parse_axes, shares
 from tracking.stress.scene_player import Store, contender, scene_player
-from tracking.stress.sweep import Plan, Sweep, generate_command
+from tracking.stress.sweep import Plan, Sweep, generate_command, key_of
 from tracking.stress.worst_scenes import SearchedScene, search, worst
 
 EPISODES, TABLE, RESULT = "episodes.jsonl", "episodes.parquet", "stress.json"
@@ -65,7 +65,9 @@ def stress(options: StressOptions) -> CommandResult:
 def _plan(options: StressOptions, detections: DetectionMode) -> Plan:
     by, axes = checked_key(options.by, better=("higher",)), parse_axes(options.vary)
     seeds = tuple(option_parsing.seeds(options.seeds, "--seeds"))
-    settings = (*option_parsing.sensor_settings(options.sensor), *option_parsing.scenario_settings(options.settings))
+    chosen = option_parsing.scenario_settings(options.settings)
+    _refuse_varied(chosen, axes)
+    settings = (*option_parsing.sensor_settings(options.sensor), *chosen)
     if options.search is None and len(axes) > MOST_AXES:
         got, remedy = f"{len(axes)} axes", "leave some out, or search their scenes with --search N"
         raise InputError(place="--vary", got=got, expected=f"at most {MOST_AXES}", remedy=remedy)
@@ -76,6 +78,14 @@ def _plan(options: StressOptions, detections: DetectionMode) -> Plan:
         tuple(options.suite), axes, seeds, min(len(seeds), options.start), by, options.share, detections, settings,
         options.episodes, options.minutes,
     )  # fmt: skip
+
+
+def _refuse_varied(settings: Iterable[str], axes: Iterable[Axis]) -> None:
+    names = {key_of(text): axis.name for axis in axes for text in axis.settings(axis.easy)}
+    for key in map(key_of, settings):
+        if key in names:
+            got, remedy = "what --vary varies", f"leave it out, and give the ends: --vary {names[key]}=EASY:HARD"
+            raise InputError(place=f"--set {key}", got=got, expected="other keys", remedy=remedy)
 
 
 def _data(sweep: Sweep, found: list[SearchedScene] | None) -> dict[str, Any]:
@@ -197,6 +207,7 @@ def _curves(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
     title = f"{plan.by}{over} ({', '.join(plan.scenarios)}, {counted(sweep.seeds, 'seed')})"
     if data["matrix"] is not None:
         yield from _matrices(sweep, data["matrix"], title)
+        yield from _shortage_lines(sweep, data)
         return
     names = [f"{values[0]:g}" if axes else "all" for values in sweep.values]
     if axes:
@@ -243,22 +254,28 @@ def _break_lines(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
         return
     if data["matrix"] is not None:
         yield from filter(None, _frontier_lines(sweep, data["matrix"]))
-    if len(sweep.plan.axes) != 1:
-        return
-    curves, limit = data["curves"], sweep.plan.share
-    shown = {f"{name}: share of the oracle": curves[name]["share"] for name in sweep.trackers}
-    shown |= {f"{name}: {sweep.plan.by}": curve for name, curve in curves.items()}
-    for words, curve in shown.items():
-        yield printable(f"{words} {_break_words(curve, limit, [value for (value,) in sweep.values])}")
-    points = [curve["break"] for curve in shown.values()]
-    if any(p["cell"] or (p["at"] is not None and None in p.values()) for p in points):
+    elif sweep.plan.axes:
+        curves, limit = data["curves"], sweep.plan.share
+        shown = {f"{name}: share of the oracle": curves[name]["share"] for name in sweep.trackers}
+        shown |= {f"{name}: {sweep.plan.by}": curve for name, curve in curves.items()}
+        for words, curve in shown.items():
+            yield printable(f"{words} {_break_words(curve, limit, [value for (value,) in sweep.values])}")
+    yield from _shortage_lines(sweep, data)
+
+
+def _shortage_lines(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
+    """Yields words on what is not known for lack of episodes, seeds or scenes."""
+    curves, matrix = data["curves"], data["matrix"]
+    points = [curve["break"] for one in curves.values() for curve in (one, one.get("share", one)) if curve["break"]]
+    unknown = matrix is not None and any("unknown" in row for f in matrix["frontier"].values() for row in f["sides"])
+    if unknown or any(p["cell"] or (p["at"] is not None and None in p.values()) for p in points):
         when = "in the first round" if sweep.rounds == 1 else f"after {sweep.rounds} rounds"
         if sweep.stopped:
             yield f"the budget ended {when}: wide intervals need more --episodes or --minutes"
         elif sweep.seeds == len(sweep.plan.seeds):
             yield "all seeds are played: wide intervals need more --seeds"
     scenes = min((count for curve in curves.values() for count in curve["scenes"]), default=0)
-    if scenes < FEWEST:
+    if few(scenes):
         yield f"fewer than {FEWEST} scenes: intervals are indicative"
 
 

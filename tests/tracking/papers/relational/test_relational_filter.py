@@ -186,13 +186,18 @@ def test_who_is_only_predicted_is_not_seen(kind):
     assert [t.seen.tolist() for t in tracks[4:]] == [[True, True], [False, False], [True, False], [True, True]]
 
 
-@pytest.mark.parametrize(("apart", "frames"), [(9.0, 8), (0.7, 21)])
-def test_a_missed_person_is_reported_while_probably_there_and_longer_beside_a_partner(apart, frames):
-    """Alone for m s: exp(-m / 0.3), hidden once a second, above 1 / 15, gone once in 15 s, up to m = 0.81 s."""
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize(("apart", "least", "most"), [(9.0, 8, 8), (0.7, 18, 21)])
+def test_a_missed_person_is_reported_while_probably_there_and_longer_beside_a_partner(apart, least, most, seed):
+    """For m s while exp(-m / 0.3), hidden once a second, is above a / 15, gone once in 15 s. a is the share of
+    particles without a seen partner: 1 if alone, up to m = 0.81 s, and 1.8 s if it is below 0.037."""
     walk = [[(0.1 * k, 0.0), (0.1 * k, apart)] for k in range(51)]
     tracker = Relational()
-    tracks = stepped(tracker, [*walk[:30], *[people[:1] for people in walk[30:50]], None, walk[50]])
-    assert [len(t.id) for t in tracks[30:51]] == [2] * frames + [1] * (21 - frames)
+    tracks = stepped(tracker, [*walk[:30], *[people[:1] for people in walk[30:50]], None, walk[50]], seed)
+    reported = [len(t.id) for t in tracks[30:51]]
+    frames = reported.count(2)
+    assert least <= frames <= most
+    assert reported == [2] * frames + [1] * (21 - frames)
     assert tracks[51].id.tolist() == tracks[29].id.tolist()
     tracker.slots.missed[0], tracker.slots.seen[:] = 2.0, False  # the partner is behind something in all particles
     assert tracker._stayed()[0] < 0.1
