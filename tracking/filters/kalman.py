@@ -94,25 +94,6 @@ def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
     return np.asarray(y * y / s)
 
 
-def distances(state: Array, z: Array, noise: Array | float, scale: Array | float = 1.0) -> Array:
-    """Returns squared Mahalanobis distances (N, M) of N predicted filters and M measurements z (M, D) (eq. 9).
-
-    noise: variance of all measurements, (D,) or a number. scale: units of z per square root of the covariances' unit
-    (px per m), (N,) or a number.
-    """
-    place, w = state[PLACE], 1.0 / ((state[VAR] + noise) * np.reshape(np.square(scale), (-1, 1)))
-    if not len(place) or not len(z):
-        return np.zeros((len(place), len(z)))
-    # matrix products are several times faster than (N, M, D) arrays
-    # relative to the first measurement, so that little precision cancels in p² - 2 p m + m²
-    p, m = place - z[0], z - z[0]
-    pw = p * w
-    d2 = w @ (m * m).T
-    d2 -= pw @ (m + m).T
-    d2 += np.einsum("nd,nd->n", pw, p)[:, None]
-    return np.asarray(np.maximum(d2, 0.0, out=d2))
-
-
 def asymptote(dt: float, sigma: Array | float, noise: Array | float) -> Array:
     """Returns the innovation variance S to which a filter converges if it is measured in every frame (Kalata 1984). dt:
     s; sigma: standard deviation of the acceleration; noise: variance of a measurement."""

@@ -37,8 +37,9 @@ from sim.scene.standing import standing_points
 from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Camera, Context, Ints
 from tracking.detect.person_size import upright
-from tracking.filters import assignment, existence, kalman, track_uncertainty
+from tracking.filters import assignment, existence, kalman, kalman_kernels, track_uncertainty
 from tracking.papers.blob import box_geometry, person_look_kernels
+from tracking.papers.blob import track_management_kernels as kernels
 from tracking.papers.blob.config import BlobConfig
 
 # Relative margin of rho, with which deletion comes earlier, so that filters near their steady state count as in it.
@@ -47,7 +48,6 @@ LARGEST_SCALE = 2.0  # largest scale of a track relative to the sequence's; the 
 LIKELY = 0.5  # least probability of a confirmed track, and of a reported box
 LEAST_EXISTENCE = 0.01  # a track with a lower existence probability is deleted, or not started
 BODY = 0.35  # m: a box is right if its middle is so near to the person
-IN_FRONT = 0.15  # m in the image: whose feet are lower by more stands in front
 SIZE_SPREAD = 0.3  # m: standard deviation of height and width of false boxes
 LEAST_VIEW = 5.0  # m: least width and height of the field of view
 DOUBLES = 0.05  # boxes per frame that a person has beside the own one, on average
@@ -154,11 +154,8 @@ class TrackedPeople:
         known."""
         if self.top or len(self.id) < 2:
             return np.ones(len(self.id))
-        place = self.upright_boxes()
-        foot = place[:, 1] + place[:, 2] / 2
-        in_front = foot - foot[:, None] > IN_FRONT * self.scale[:, None]
-        covered = np.where(in_front, box_geometry.covered_share(place, place), 0.0) * self.existence()
-        return np.asarray(1 - covered.max(1) * self._well_placed())
+        hidden = kernels.hidden_shares(self.upright_boxes(), self.scale, self.existence())
+        return np.asarray(1 - hidden * self._well_placed())
 
     def _well_placed(self) -> Array:
         from scipy.special import erf
@@ -166,30 +163,31 @@ class TrackedPeople:
         return np.asarray(erf(BODY / np.sqrt(2 * self.bank[kalman.VAR, :, 0])))
 
     def innovations(self, z: Array) -> tuple[Array, Array]:
-        """Returns d^2 (N, M) (eq. 9), and ln |2 pi S| (N, 1), in m, of N tracks and M boxes z (M, 4)."""
+        """Returns d^2 (N, M) (eq. 9), and ln |2 pi S| (N,), in m, of N tracks and M boxes z (M, 4)."""
         s = self.bank[kalman.VAR] + self.noise
-        return kalman.distances(self.bank, z, self.noise, self.scale), np.log(2 * np.pi * s).sum(1)[:, None]
+        return kalman_kernels.distances(self.bank[kalman.PLACE], s, z, self.scale), np.log(2 * np.pi * s).sum(1)
 
-    def evidence(self, d2: Array, log_det: Array) -> Array:
-        """Returns ln N(z; z_pred, S) (N, M) over the density of false boxes, from d^2 and ln |2 pi S|."""
-        return np.asarray(-0.5 * (d2 + log_det) - np.log(self._false_density(self.scale))[:, None])
+    def evidence(self, rows: Ints, d2: Array, log_det: Array) -> Array:
+        """Returns ln N(z; z_pred, S) over the density of false boxes, of P pairs of tracks `rows` and boxes, from d^2
+        and ln |2 pi S|; all (P,)."""
+        return np.asarray(-0.5 * (d2 + log_det) - np.log(self._false_density(self.scale[rows])))
 
     def _false_density(self, scale: Array) -> Array:
-        area = np.prod(np.maximum(self.view_high - self.view_low, LEAST_VIEW * self.px_per_m))
-        return np.asarray(self.config.clutter_rate * np.square(scale) / area / (2 * np.pi * SIZE_SPREAD**2))
+        wide, high = np.maximum(self.view_high - self.view_low, LEAST_VIEW * self.px_per_m)
+        return np.asarray(self.config.clutter_rate * np.square(scale) / (wide * high) / (2 * np.pi * SIZE_SPREAD**2))
 
-    def associate(self, d2: Array, evidence: Array, ratio: Array | float = 1.0) -> tuple[Ints, Ints]:
-        """Returns rows and columns (K,) of associated tracks and measurements, one to one. d2, evidence (N, M): as of
-        `innovations` and `evidence`; inf in d2 forbids a pair. ratio: likelihood ratio of the score, (M,)."""
+    def associate(self, rows: Ints, columns: Ints, d2: Array, evidence: Array, ratio: Array | float = 1.0) -> Ints:
+        """Returns the indices (K,) of the associated pairs, one to one, of P pairs of tracks `rows` and measurements
+        `columns`, row by row. d2, evidence (P,): of `innovations` and `evidence`; ratio (P,): of the score."""
         if not self.by_existence:
-            return assignment.cheapest_per_track(*assignment.nearest(d2), d2)
-        c, (shown, _, false) = self.config, self.states
-        measured = self.detectable[:, None] * (shown[:, None] * ratio + false[:, None])
-        missed = (1 - self.detectable * (shown + false))[:, None]
-        unowned = 1 + self._new_people(ratio) / c.clutter_rate
+            best = assignment.cheapest(columns, d2, rows)
+            return best[assignment.cheapest(rows[best], d2[best], columns[best])]
+        p, (shown, _, false) = self.detectable[rows], self.states[:, rows]
+        missed, unowned = 1 - p * (shown + false), 1 + self._new_people(ratio) / self.config.clutter_rate
         with np.errstate(divide="ignore"):
-            cost = np.log(missed * unowned) - np.log(measured) - evidence
-        return assignment.optimal(np.where(np.isfinite(d2), cost, np.inf), 0.0)
+            cost = np.log(missed * unowned / (p * (shown * ratio + false))) - evidence
+        likely = np.flatnonzero(cost < 0)
+        return likely[assignment.one_to_one(rows[likely], columns[likely], cost[likely])]
 
     def _new_people(self, ratio: Array | float) -> Array | float:
         return existence.BIRTH_RATE * self.unseen_time * self.config.detect_prob * ratio
@@ -260,12 +258,11 @@ class TrackedPeople:
         """
         c, new = self.config, self._new_people(ratio)
         person = new / (new + c.clutter_rate) * np.ones(len(z))
-        earlier = np.tri(len(z), k=-1) * np.where(free, person, 0.0)
-        owned = np.concatenate([np.tile(self.existence() * self.measured, (len(z), 1)), earlier], 1)
-        place, scale = np.concatenate([self.bank[kalman.PLACE], z]), np.concatenate([self.scale, self._scale_of(z)])
-        d2 = np.square((z[:, None] - place) / (DOUBLE_SPREAD * scale[:, None])).sum(2)
-        density = np.exp(-0.5 * d2) / (2 * np.pi * DOUBLE_SPREAD**2) ** 2 / self._false_density(scale)
-        double = c.clutter_rate * DOUBLES * (density * owned).sum(1)
+        tracks = self.bank[kalman.PLACE], self.scale, self.existence() * self.measured
+        double, doubles = np.zeros(len(z)), c.clutter_rate * DOUBLES / (2 * np.pi * DOUBLE_SPREAD**2) ** 2
+        for place, scale, owned in (tracks, (z, self._scale_of(z), person * free)):
+            weight = doubles * owned / self._false_density(scale)
+            kernels.add_nearness(double, z, place, DOUBLE_SPREAD * scale, weight, place is z)
         if len(z) or len(self.id):
             stay = np.exp(-self.dynamics.dt / existence.LIFETIME)
             self.unseen_time = stay * (1 - self.detect_prob) * self.unseen_time + self.dynamics.dt
@@ -397,9 +394,10 @@ class TrackedEllipses(TrackedPeople):
     def directed_innovations(self, z: Array, angle_var: Array) -> tuple[Array, Array]:
         """Returns d^2 (eq. 9) and ln |2 pi S|, (N, M) each, of N tracks and M ellipses; a direction counts relative to
         a uniform one."""
-        d2, log_det = self.innovations(z[:, :4])
+        d2, log_det = self.innovations(np.ascontiguousarray(z[:, :4]))
         angle_s = self.angle[kalman.DIRECTION_VAR][:, None] + np.where(kalman.directed(angle_var), angle_var, np.inf)
-        return d2 + self.direction_distances(z[:, 4], angle_var), log_det + np.log(np.minimum(2 / np.pi * angle_s, 1.0))
+        turned = np.log(np.minimum(2 / np.pi * angle_s, 1.0))
+        return d2 + self.direction_distances(z[:, 4], angle_var), log_det[:, None] + turned
 
     def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:
         """Updates the tracks at table positions `rows` (K,), each at most once, with ellipses z (K, 5), in place (eqs 3

@@ -50,14 +50,15 @@ class BoxUpdater:
             kalman.fade_rates(people.bank[:, :, 2:], np.exp(-people.dynamics.dt / SIZE_RATE_TIME))
         people.widen_view(z)
         d2, log_det = people.innovations(z)
-        evidence, ratio, inside = people.evidence(d2, log_det), self.scores.ratios(score), d2 <= self.gate
-        rows, columns = people.associate(np.where(inside, d2, np.inf), evidence, ratio)
-        terms = kalman.update(people.bank, rows, z[columns], people.noise)
+        rows, columns = np.nonzero(d2 <= self.gate)
+        d2, ratio, free = d2[rows, columns], self.scores.ratios(score), np.ones(len(z), bool)
+        evidence = people.evidence(rows, d2, log_det[rows])
+        best = people.associate(rows, columns, d2, evidence, ratio[columns])
+        free[columns[best] if people.by_existence else columns] = False
+        rows, columns, d2, evidence = rows[best], columns[best], d2[best], evidence[best]
+        kalman.update(people.bank, rows, z[columns], people.noise)
         people.measure_on_ground(rows, z[columns], people.noise)
-        near = np.add.reduce(terms, 1) / np.square(people.scale[rows]) <= self.confirm_gate
-        people.record_measured(rows, near, score[columns], evidence[rows, columns], ratio[columns])
-        free = np.ones(len(z), bool) if people.by_existence else ~inside.any(0)
-        free[columns] = False
+        people.record_measured(rows, d2 <= self.confirm_gate, score[columns], evidence, ratio[columns])
         person = people.new_people(z, free, ratio)
         person[columns] = people.existence()[rows]
         self.scores.add(score, person)
