@@ -67,11 +67,10 @@ def predict(state: Array, dt: float, q: Array) -> None:
     state[VAR:] += q if q.ndim == 3 else q[:, None]
 
 
-def fade_rates(state: Array, stay: float) -> None:
-    """Multiplies the rates of a bank by `stay`, 0 to 1, and their (co)variances accordingly, in place."""
-    state[RATE] *= stay
-    state[COV] *= stay
-    state[RATE_VAR] *= stay**2
+def fading(stay: Array) -> Array:
+    """Returns the factors (5, 1, D) of a bank by which rates are multiplied by `stay` (D,), 0 to 1, and their
+    (co)variances accordingly."""
+    return np.stack([np.ones_like(stay), stay, np.ones_like(stay), stay, stay**2])[:, None]
 
 
 def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:

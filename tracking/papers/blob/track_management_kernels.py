@@ -1,24 +1,32 @@
-"""Kernels of track_management: who hides whom, and which boxes are second boxes of people.
+"""Kernels of track_management: who hides whom, costs of pairs, second boxes of people, and who is reported.
 
-Boxes are centred: centre x, y, height, width, px. The loops over all pairs need no table of the pairs.
+Boxes are centred: centre x, y, height, width, px. bank (5, N, 4): Kalman filters (tracking.filters.kalman). The loops
+over all pairs need no table of the pairs.
 """
 
 from __future__ import annotations
 
+from math import erf
+
 import numpy as np
 
-from sim.types import Array
+from sim.types import Array, Bools, Ints
+from tracking.filters.existence import FALSE, SHOWN
+from tracking.filters.kalman import RATE, VAR
 from tracking.papers.blob.person_template_kernels import kernel
 
+LIKELY = 0.5  # least probability of a confirmed track, and of a reported box
+BODY = 0.35  # m: a box is right if its middle is so near to the person
 IN_FRONT = 0.15  # m in the image: whose feet are lower by more stands in front
-FARTHEST = 9.0  # standard deviations beyond which a density is taken as 0: it is below 1e-17
+FARTHEST = 9.0  # standard deviations from which a density is taken as 0: it is below 1e-17
+SIDES = ((0, 3), (1, 2))  # columns of a box: centre and side, along x and along y
 
 
 @kernel
 def covered_share(box: Array, other: Array) -> float:
     """Returns the share, 0 to 1, of a box (4,) that lies in another box (4,)."""
     shared = 1.0
-    for centre, side in ((0, 3), (1, 2)):
+    for centre, side in SIDES:
         low = max(box[centre] - box[side] / 2, other[centre] - other[side] / 2)
         high = min(box[centre] + box[side] / 2, other[centre] + other[side] / 2)
         shared *= max(high - low, 0.0)
@@ -36,29 +44,82 @@ def covered_shares(boxes: Array, others: Array) -> Array:
 
 
 @kernel
-def hidden_shares(boxes: Array, scale: Array, existence: Array) -> Array:
-    """Returns the largest share (N,) of each of the boxes (N, 4) that one person in front covers, times the existence
-    probability (N,) of that person; scale (N,): px per m."""
-    hidden = np.zeros(len(boxes))
-    for i in range(len(boxes)):
-        for j in range(len(boxes)):
-            if boxes[j, 1] + boxes[j, 2] / 2 - (boxes[i, 1] + boxes[i, 2] / 2) > IN_FRONT * scale[i]:
-                hidden[i] = max(hidden[i], covered_share(boxes[i], boxes[j]) * existence[j])
-    return hidden
+def well_placed(var: float) -> float:
+    """Returns the probability that the middle of a box is right; var: variance of its x, m^2."""
+    return erf(BODY / np.sqrt(2 * var))
 
 
 @kernel
-def add_nearness(total: Array, boxes: Array, owners: Array, spread: Array, weight: Array, earlier: bool) -> None:
+def visible_shares(boxes: Array, scale: Array, existence: Array, var: Array) -> Array:
+    """Returns the share (N,) of each of the boxes (N, 4) that no person in front covers, as far as places are known.
+
+    scale (N,): px per m; existence (N,): probability that the person in the box exists; var (N, 4): of places, m^2.
+    """
+    share, foot = np.ones(len(boxes)), boxes[:, 1] + boxes[:, 2] / 2
+    for i in range(len(boxes)):
+        hidden = 0.0
+        for j in range(len(boxes)):
+            if foot[j] - foot[i] > IN_FRONT * scale[i]:
+                hidden = max(hidden, covered_share(boxes[i], boxes[j]) * existence[j])
+        if hidden > 0:
+            share[i] -= hidden * well_placed(var[i, 0])
+    return share
+
+
+@kernel
+def pair_costs(rows: Ints, evidence: Array, ratio: Array, unowned: Array, detectable: Array, states: Array) -> Array:
+    """Returns ln p(missed, box is nobody's) - ln p(measured) of P pairs of tracks `rows` and boxes, (P,).
+
+    evidence (P,): ln of the box's density over that of false ones; ratio (P,): likelihood ratio of its score; unowned
+    (P,): likelihood of a box that is nobody's, over that of a false one. detectable (N,), states (3, N): of all tracks.
+    """
+    cost = np.empty(len(rows))
+    for k in range(len(rows)):
+        p, shown, false = detectable[rows[k]], states[SHOWN, rows[k]], states[FALSE, rows[k]]
+        missed, measured = 1 - p * (shown + false), p * (shown * ratio[k] + false)
+        cost[k] = np.log(missed * unowned[k]) - np.log(measured) - evidence[k]
+    return cost
+
+
+@kernel
+def add_doubles(total: Array, boxes: Array, owners: Array, spread: Array, weight: Array, earlier: bool) -> None:
     """Adds to `total` (M,), in place, the sum over the owners (N, 4) of weight (N,) times exp(-d^2 / 2).
 
     d: distance of each of the boxes (M, 4) from the owner, in its standard deviation spread (N,), px. earlier: only of
     owners with a smaller index than the box.
     """
     for j in range(len(owners)):
-        if weight[j] > 0:
-            for i in range(j + 1 if earlier else 0, len(boxes)):
-                if abs(boxes[i, 0] - owners[j, 0]) < FARTHEST * spread[j]:
-                    d2 = 0.0
-                    for axis in range(4):
-                        d2 += ((boxes[i, axis] - owners[j, axis]) / spread[j]) ** 2
-                    total[i] += weight[j] * np.exp(-0.5 * d2)
+        for i in range(j + 1 if earlier else 0, len(boxes) if weight[j] > 0 else 0):
+            if abs(boxes[i, 0] - owners[j, 0]) < FARTHEST * spread[j]:
+                d2 = 0.0
+                for axis in range(4):
+                    d2 += ((boxes[i, axis] - owners[j, axis]) / spread[j]) ** 2
+                total[i] += weight[j] * np.exp(-0.5 * d2)
+
+
+@kernel
+def reported(boxes: Array, bank: Array, existence: Array, measured: Bools, low: Array, high: Array) -> Bools:
+    """Returns flags (N,): True if a person's box is right with the probability LIKELY, and not leaving the field of
+    view, from low to high (2,), px, while missed."""
+    shown = np.empty(len(boxes), np.bool_)
+    for i in range(len(boxes)):
+        right, leaves = 1.0 if measured[i] else well_placed(bank[VAR, i, 0]), False
+        for axis, side in SIDES:
+            rate, half = bank[RATE, i, axis], boxes[i, side] / 2
+            leaves |= (rate < 0 and boxes[i, axis] - half < low[axis]) or (
+                rate > 0 and boxes[i, axis] + half > high[axis]
+            )
+        shown[i] = existence[i] * right >= LIKELY and (measured[i] or not leaves)
+    return shown
+
+
+@kernel
+def image_covariance(bank: Array, scale: Array) -> Array:
+    """Returns the covariances (N, 4, 4) of x, y, vx, vy, px and px/s, of filters; scale (N,): px per m."""
+    cov = np.zeros((len(scale), 4, 4))
+    for i in range(len(scale)):
+        for axis in range(2):
+            var, cross, rate_var = bank[VAR:, i, axis] * (scale[i] * scale[i])
+            cov[i, axis, axis], cov[i, axis + 2, axis + 2] = var, rate_var
+            cov[i, axis, axis + 2] = cov[i, axis + 2, axis] = cross
+    return cov

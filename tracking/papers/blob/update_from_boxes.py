@@ -26,7 +26,8 @@ class BoxUpdater:
     """Updates the tracks of `people`, a table that must follow `config` already, from the boxes of each frame.
 
     State: people, the table of tracks; scores, the calibration of scores; gate, confirm_gate: largest d^2 (squared
-    Mahalanobis distance) of an association and of a measurement that may confirm a track.
+    Mahalanobis distance) of an association and of a measurement that may confirm a track; fading (5, 1, 4): factors
+    of the filters in each frame.
     """
 
     def __init__(self, config: BlobConfig, people: TrackedPeople) -> None:
@@ -38,6 +39,8 @@ class BoxUpdater:
         from scipy.special import chdtri
 
         self.gate, self.confirm_gate = chdtri(4, 1 - np.array([config.gate, CONFIRM_GATE]))  # eq. 10
+        stay = np.exp(-self.people.dynamics.dt / SIZE_RATE_TIME)
+        self.fading = kalman.fading(np.array([1.0, 1.0, stay, stay]))
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
         """Updates the tracks with a frame's detections: predict, associate, update, confirm, delete, start."""
@@ -47,7 +50,7 @@ class BoxUpdater:
             image_scale.required(people.px_per_m)
         people.predict(observed=detections is not None)
         if people.by_existence:
-            kalman.fade_rates(people.bank[:, :, 2:], np.exp(-people.dynamics.dt / SIZE_RATE_TIME))
+            people.bank *= self.fading
         people.widen_view(z)
         d2, log_det = people.innovations(z)
         rows, columns = np.nonzero(d2 <= self.gate)

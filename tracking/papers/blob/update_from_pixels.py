@@ -30,9 +30,14 @@ from tracking.detect.blobs import Blobs
 from tracking.detect.foreground import Foreground, Segmented
 from tracking.detect.person_size import KEPT, PersonSize, upright
 from tracking.filters import kalman
-from tracking.papers.blob import box_geometry, person_look_kernels, person_template, person_template_search_kernels
+from tracking.papers.blob import (
+    box_geometry,
+    person_look_kernels,
+    person_template,
+    person_template_search_kernels,
+    track_management_kernels,
+)
 from tracking.papers.blob import person_template_kernels as kernels
-from tracking.papers.blob import track_management_kernels
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.person_look_kernels import LEARN_SHOWN, LOOK_TIME
 from tracking.papers.blob.track_management import TrackedEllipses
