@@ -30,8 +30,10 @@ def one_to_one(rows: Ints, columns: Ints, cost: Array, unassigned: float = 0.0) 
     # most pairs share neither row nor column with another: the search, cubic in their number, is for the others
     contested = np.bincount(rows)[rows] + np.bincount(columns)[columns] > 2
     many = np.flatnonzero(contested)
+    if not len(many):
+        return np.arange(len(rows))
     at = _places(rows[many]), _places(columns[many])
-    index = np.full([place.max(initial=-1) + 1 for place in at], -1)
+    index = np.full([place.max() + 1 for place in at], -1)
     table = np.full(index.shape, unassigned)
     table[at], index[at] = cost[many], many
     best = index[linear_sum_assignment(table)]
@@ -41,9 +43,7 @@ def one_to_one(rows: Ints, columns: Ints, cost: Array, unassigned: float = 0.0) 
 
 def _places(numbers: Ints) -> Ints:
     """Returns the place of each number among those that occur, from 0."""
-    occurs = np.zeros(numbers.max(initial=-1) + 1, bool)
-    occurs[numbers] = True
-    return np.asarray(occurs.cumsum()[numbers] - 1)
+    return np.asarray((np.bincount(numbers) > 0).cumsum()[numbers] - 1)
 
 
 def optimal(cost: Array, unassigned: float) -> tuple[Ints, Ints]:

@@ -16,10 +16,11 @@ def distances(place: Array, s: Array, z: Array, scale: Array) -> tuple[Array, Ar
     place, s (N, D): predicted places, and variances of the innovation. scale (N,): units of z per square root of the
     variances' unit (px per m).
     """
-    d2, log_det = np.zeros((len(place), len(z))), np.empty(len(place))
+    d2, log_det, z = np.zeros((len(place), len(z))), np.zeros(len(place)), z.T.copy()
     for i in range(len(place)):
-        w, log_det[i] = 1.0 / (s[i] * scale[i] ** 2), np.log(2 * np.pi * s[i]).sum()
-        for j in range(len(z)):
-            for axis in range(z.shape[1]):
-                d2[i, j] += (z[j, axis] - place[i, axis]) ** 2 * w[axis]
+        for axis in range(len(z)):  # the inner loop runs along memory
+            w = 1.0 / (s[i, axis] * scale[i] ** 2)
+            log_det[i] += np.log(2 * np.pi * s[i, axis])
+            for j in range(z.shape[1]):
+                d2[i, j] += (z[axis, j] - place[i, axis]) ** 2 * w
     return d2, log_det

@@ -83,15 +83,15 @@ class TrackedPeople:
         view_low, view_high (2,)   corners x, y of the field of view, px; inf and -inf before it is known
     detect_prob: that of the config, 0 in a frame that was not observed; detectable (N,): probability that a person who
     exists and is shown is measured in this frame; rho (N,): with "rho", sqrt|S| (innovation covariance) over its
-    asymptote, as predicted; unseen_time: s, BIRTH_RATE times it is the expected number of people
-    in view without a track; px_per_m: the image's scale; from pixels that of the frame. Also config, context, dynamics
-    (the nominal filter), top (True from straight above), and what `follow` derives.
+    asymptote, as predicted; unseen_time: s, BIRTH_RATE times it is the expected number of people in view without a
+    track; false_density: expected false boxes in this frame per px^2 of place and m^2 of size; px_per_m: the image's
+    scale; from pixels that of the frame. Also config, context, dynamics (the nominal filter), top (True from straight above), and what
+    `follow` derives.
     """
 
     # Axis of the tracks in each column of the table.
     columns: ClassVar[dict[str, int]] = {
-        "bank": 1, "id": 0, "scale": 0, "born": 0, "score": 0, "states": 1, "confirmed": 0, "measured": 0,
-        "stand": 0, "stand_cov": 0,
+        "bank": 1, "id": 0, "scale": 0, "born": 0, "score": 0, "states": 1, "confirmed": 0, "measured": 0
     }  # fmt: skip
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
@@ -103,7 +103,9 @@ class TrackedPeople:
         self.bank, self.id, self.next_id = np.zeros((5, 0, 4)), np.zeros(0, np.int64), 1
         self.scale, self.born, self.score = np.zeros((3, 0))
         self.confirmed, self.measured = np.zeros((2, 0), bool)
-        self.stand, self.stand_cov = np.zeros((0, 5)), np.zeros((0, 5, 5))
+        if context.camera is not None:
+            self.stand, self.stand_cov = np.zeros((0, 5)), np.zeros((0, 5, 5))
+            self.columns = {**self.columns, "stand": 0, "stand_cov": 0}  # type: ignore[misc]
         self.states, self.unseen_time = np.zeros((3, 0)), existence.LIFETIME
         self.follow(config, dynamics)
 
@@ -164,11 +166,7 @@ class TrackedPeople:
     def evidence(self, rows: Ints, d2: Array, log_det: Array) -> Array:
         """Returns ln N(z; z_pred, S) over the density of false boxes, of P pairs of tracks `rows` and boxes, from d^2
         and ln |2 pi S|; all (P,)."""
-        return np.asarray(-0.5 * (d2 + log_det) - np.log(self._false_density() * np.square(self.scale[rows])))
-
-    def _false_density(self) -> float:
-        wide, high = np.maximum(self.view_high - self.view_low, LEAST_VIEW * self.px_per_m)
-        return float(self.config.clutter_rate / (wide * high) / (2 * np.pi * SIZE_SPREAD**2))
+        return np.asarray(-0.5 * (d2 + log_det) - np.log(self.false_density * np.square(self.scale[rows])))
 
     def associate(self, rows: Ints, columns: Ints, d2: Array, evidence: Array, ratio: Array | float = 1.0) -> Ints:
         """Returns the indices (K,) of the associated pairs, one to one, of P pairs of tracks `rows` and measurements
@@ -252,7 +250,7 @@ class TrackedPeople:
         c, new = self.config, self._new_people(ratio * np.ones(len(z)))
         person = new / (new + c.clutter_rate)
         tracks = self.bank[kalman.PLACE], self.scale, self.existence() * self.measured
-        doubles = c.clutter_rate * DOUBLES / (2 * np.pi * DOUBLE_SPREAD**2) ** 2 / self._false_density()
+        doubles = c.clutter_rate * DOUBLES / (2 * np.pi * DOUBLE_SPREAD**2) ** 2 / self.false_density
         double = np.zeros(len(z))
         for place, scale, owned in (tracks, (z, self._scale_of(z), person * free)):
             weight = doubles * owned / np.square(scale)
@@ -292,8 +290,9 @@ class TrackedPeople:
             id=np.arange(self.next_id, self.next_id + n), scale=self._scale_of(z), born=np.full(n, t), score=score,
             states=existence.newborn(person),
             confirmed=self.by_existence & (person >= kernels.LIKELY), measured=np.ones(n, bool),
-            stand=np.full((n, 5), np.nan), stand_cov=np.full((n, 5, 5), np.nan),
         )  # fmt: skip
+        if self.context.camera is not None:
+            self._append(stand=np.full((n, 5), np.nan), stand_cov=np.full((n, 5, 5), np.nan))
         self.next_id += n
 
     def _append(self, **new: Array | Ints | Bools) -> None:
@@ -314,6 +313,8 @@ class TrackedPeople:
         elif len(z):
             self.view_low = np.minimum(self.view_low, (z[:, :2] - z[:, :1:-1] / 2).min(0))
             self.view_high = np.maximum(self.view_high, (z[:, :2] + z[:, :1:-1] / 2).max(0))
+        wide, high = np.maximum(self.view_high - self.view_low, LEAST_VIEW * self.px_per_m)
+        self.false_density = self.config.clutter_rate / (wide * high) / (2 * np.pi * SIZE_SPREAD**2)
 
 
 ANGLE_RATE = 15.0  # deg/s^0.5, random walk of the direction: its standard deviation after one second

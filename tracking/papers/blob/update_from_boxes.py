@@ -78,7 +78,7 @@ class BoxUpdater:
         if detections is None or detections.box is None or not len(detections.box):
             return np.zeros((0, 4)), np.zeros(0)
         score = detections.score if len(detections.score) else np.ones(len(detections.box))
-        good = np.flatnonzero((detections.box[:, 2:] > 0).all(1))
+        good = np.flatnonzero((detections.box[:, 2] > 0) & (detections.box[:, 3] > 0))
         # of two boxes on one body the second is the one with the lower score, whatever their order in the file
         order = good[np.lexsort((*detections.box[good].T, -score[good]))]
         return box_geometry.centred_from_ltwh(detections.box[order]), score[order]
