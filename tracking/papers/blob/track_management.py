@@ -85,8 +85,8 @@ class TrackedPeople:
     exists and is shown is measured in this frame; rho (N,): with "rho", sqrt|S| (innovation covariance) over its
     asymptote, as predicted; unseen_time: s, BIRTH_RATE times it is the expected number of people in view without a
     track; false_density: expected false boxes in this frame per px^2 of place and m^2 of size; px_per_m: the image's
-    scale; from pixels that of the frame. Also config, context, dynamics (the nominal filter), top (True from straight above), and what
-    `follow` derives.
+    scale; from pixels that of the frame. Also config, context, dynamics (the nominal filter), top (True from straight
+    above), and what `follow` derives.
     """
 
     # Axis of the tracks in each column of the table.

@@ -30,17 +30,12 @@ from tracking.detect.blobs import Blobs
 from tracking.detect.foreground import Foreground, Segmented
 from tracking.detect.person_size import KEPT, PersonSize, upright
 from tracking.filters import kalman
-from tracking.papers.blob import (
-    box_geometry,
-    person_look_kernels,
-    person_template,
-    person_template_search_kernels,
-    track_management_kernels,
-)
+from tracking.papers.blob import box_geometry, person_look_kernels, person_template, person_template_search_kernels
 from tracking.papers.blob import person_template_kernels as kernels
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.person_look_kernels import LEARN_SHOWN, LOOK_TIME
 from tracking.papers.blob.track_management import TrackedEllipses
+from tracking.papers.blob.track_management_kernels import covered_shares
 from tracking.running import image_scale
 
 SIZE_TIME = 0.5  # s between pictures from which sizes are learned once enough is remembered: it must be of many people
@@ -185,7 +180,7 @@ class PixelUpdater:
     def _lone_people(self, found: Blobs, expected: Array) -> Bools:
         one = not self.size.reliable or self.size.one_person(found.box, found.ellipse)
         sure, blobs = expected[self.people.confirmed], box_geometry.centred_from_ltwh(found.box)
-        several = (track_management_kernels.covered_shares(sure, blobs) >= SHARED).sum(0) > 1
+        several = (covered_shares(sure, blobs) >= SHARED).sum(0) > 1
         return np.asarray(one & ~found.cut() & ~several)
 
     def _person_boxes(self, upright: Array) -> Array:
@@ -196,9 +191,10 @@ class PixelUpdater:
 
     def _associate(self, z: Array, angle_var: Array) -> tuple[Measured, Ints, Array]:
         d2, log_det = self.people.directed_innovations(z, self._gated_direction(angle_var))
-        pairs = np.isfinite(self._gated(d2, angle_var)).nonzero()
-        evidence = self.people.evidence(pairs[0], d2[pairs], log_det[pairs])
-        rows, taken = np.take(pairs, self.people.associate(*pairs, d2[pairs], evidence), 1)
+        rows, taken = np.isfinite(self._gated(d2, angle_var)).nonzero()
+        evidence = self.people.evidence(rows, d2[rows, taken], log_det[rows, taken])
+        best = self.people.associate(rows, taken, d2[rows, taken], evidence)
+        rows, taken = rows[best], taken[best]
         noise = np.tile(self.people.noise, (len(rows), 1))
         return Measured(rows, z[taken], noise, angle_var[taken], np.ones(len(rows))), taken, d2
 

@@ -70,8 +70,8 @@ def test_a_pair_costs_less_the_likelier_it_is():
 @pytest.mark.parametrize("seed", range(4))
 def test_who_leaves_the_view_or_may_be_elsewhere_is_not_reported_while_missed(seed):
     r = np.random.default_rng(seed)
-    boxes, bank, person, measured = boxes_of(r, 60), r.normal(0, 3, (5, 60, 4)), r.random(60), r.random(60) < 0.5
-    bank[kalman.VAR] = r.uniform(0.01, 0.5, (60, 4))
+    boxes, bank, person, measured = boxes_of(r, 200), r.normal(0, 3, (5, 200, 4)), r.random(200), r.random(200) < 0.5
+    bank[kalman.VAR] = r.uniform(0.01, 0.3, (200, 4))
     half, rate = boxes[:, 3:1:-1] / 2, bank[kalman.RATE, :, :2]
     low, high = boxes[:, :2] - half < VIEW[0], boxes[:, :2] + half > VIEW[1]
     leaves = ((low & (rate < 0)) | (high & (rate > 0))).any(1)
