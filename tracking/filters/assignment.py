@@ -17,9 +17,7 @@ def cheapest(of: Ints, cost: Array, ties: Ints) -> Ints:
     """Returns the index of the cheapest pair of each row, or column, `of` (P,), sorted by it. Of equal costs the
     smallest of `ties` (P,) wins."""
     order = np.lexsort((ties, cost, of))
-    first = np.ones(len(of), bool)
-    first[1:] = of[order[1:]] != of[order[:-1]]
-    return np.asarray(order[first])
+    return np.asarray(order[np.diff(of[order], prepend=-1) > 0])
 
 
 def one_to_one(rows: Ints, columns: Ints, cost: Array, unassigned: float = 0.0) -> Ints:
@@ -32,18 +30,13 @@ def one_to_one(rows: Ints, columns: Ints, cost: Array, unassigned: float = 0.0) 
     many = np.flatnonzero(contested)
     if not len(many):
         return np.arange(len(rows))
-    at = _places(rows[many]), _places(columns[many])
-    index = np.full([place.max() + 1 for place in at], -1)
+    i, j = ((np.bincount(each) > 0).cumsum()[each] - 1 for each in (rows[many], columns[many]))
+    index = np.full((i.max() + 1, j.max() + 1), -1)
     table = np.full(index.shape, unassigned)
-    table[at], index[at] = cost[many], many
+    table[i, j], index[i, j] = cost[many], many
     best = index[linear_sum_assignment(table)]
     contested[best[best >= 0]] = False
     return np.flatnonzero(~contested)
-
-
-def _places(numbers: Ints) -> Ints:
-    """Returns the place of each number among those that occur, from 0."""
-    return np.asarray((np.bincount(numbers) > 0).cumsum()[numbers] - 1)
 
 
 def optimal(cost: Array, unassigned: float) -> tuple[Ints, Ints]:

@@ -47,9 +47,7 @@ def transition(dt: float, hidden_time: float) -> Array:
 def newborn(person: Array) -> Array:
     """Returns the probabilities (3, K) of the states shown, hidden and false of K new tracks; person (K,): probability
     that each is a person, who is then shown."""
-    states = np.zeros((3, len(person)))
-    states[SHOWN], states[FALSE] = person, 1 - person
-    return states
+    return np.array([person, 0 * person, 1 - person])
 
 
 def update(states: Array, rows: Ints, p: Array, g: Array, ratio: Array | float) -> None:

@@ -35,8 +35,7 @@ def white_acceleration(dt: float, sigma: Array | float) -> Array:
     from filterpy.common import Q_discrete_white_noise
 
     unit = Q_discrete_white_noise(2, dt)
-    q = np.square(np.asarray(sigma, float))
-    return np.stack([q * unit[0, 0], q * unit[0, 1], q * unit[1, 1]])
+    return np.asarray(np.multiply.outer(unit[[0, 0, 1], [0, 1, 1]], np.square(sigma)))
 
 
 def constant_velocity(dt: float, axes: int) -> tuple[Array, Array]:

@@ -49,7 +49,6 @@ LEAST_EXISTENCE = 0.01  # a track with a lower existence probability is deleted,
 SIZE_SPREAD = 0.3  # m: standard deviation of height and width of false boxes
 LEAST_VIEW = 5.0  # m: least width and height of the field of view
 DOUBLES = 0.05  # boxes per frame that a person has beside the own one, on average
-DOUBLE_SPREAD = 0.3  # m: standard deviation of centre, height and width of such a box
 HEIGHT_SPREAD = 0.1  # m: standard deviation of people's heights
 PLACE_SPREAD = 10.0  # m: standard deviation of the place on the ground before the first box
 NUDGE = 1e-4  # m: step of the numerical derivatives of `seen_boxes`
@@ -136,7 +135,9 @@ class TrackedPeople:
             self.rho = self.compute_rho()
         self.states[:] = self.transition @ self.states
         self.detect_prob = observed * self.config.detect_prob
-        self.detectable = self.detect_prob * self.visible_shares()
+        boxes, var = self.upright_boxes(), self.bank[kalman.VAR]
+        shown = 1.0 if self.top else kernels.visible_shares(boxes, self.scale, self.existence(), var)
+        self.detectable = self.detect_prob * shown * np.ones(len(self.id))
 
     def compute_rho(self) -> Array:
         """Returns rho (N,) of all tracks as predicted: sqrt|S| over its asymptote, S the innovation covariance; 1 in
@@ -151,13 +152,6 @@ class TrackedPeople:
     def existence(self) -> Array:
         """Returns the existence probability (N,) of all tracks."""
         return np.asarray(self.states[existence.SHOWN] + self.states[existence.HIDDEN])
-
-    def visible_shares(self) -> Array:
-        """Returns the share (N,) of each person's box that no other person in front covers, as far as places are
-        known."""
-        if self.top:
-            return np.ones(len(self.id))
-        return kernels.visible_shares(self.upright_boxes(), self.scale, self.existence(), self.bank[kalman.VAR])
 
     def innovations(self, z: Array) -> tuple[Array, Array]:
         """Returns d^2 (N, M) (eq. 9), and ln |2 pi S| (N,), in m, of N tracks and M boxes z (M, 4)."""
@@ -174,14 +168,13 @@ class TrackedPeople:
         if not self.by_existence:
             best = assignment.cheapest(columns, d2, rows)
             return best[assignment.cheapest(rows[best], d2[best], columns[best])]
-        ratio = ratio * np.ones(len(rows))
-        unowned = 1 + self._new_people(ratio) / self.config.clutter_rate
-        cost = kernels.pair_costs(rows, evidence, ratio, unowned, self.detectable, self.states)
+        new, ratio = self._new_people() / self.config.clutter_rate, ratio * np.ones(len(rows))
+        cost = kernels.pair_costs(rows, evidence, ratio, new, self.detectable, self.states)
         likely = np.flatnonzero(cost < 0)
         return likely[assignment.one_to_one(rows[likely], columns[likely], cost[likely])]
 
-    def _new_people(self, ratio: Array) -> Array:
-        return existence.BIRTH_RATE * self.unseen_time * self.config.detect_prob * ratio
+    def _new_people(self) -> float:
+        return existence.BIRTH_RATE * self.unseen_time * self.config.detect_prob
 
     def record_measured(
         self, rows: Ints, near: Bools, score: Array, evidence: Array, ratio: Array | float = 1.0
@@ -247,14 +240,11 @@ class TrackedPeople:
         It may also be false, or a second box of a measured person or of an earlier one of the boxes `free` (M,), which
         no track has. Also counts the people without a track.
         """
-        c, new = self.config, self._new_people(ratio * np.ones(len(z)))
+        c, new, double = self.config, self._new_people() * (ratio * np.ones(len(z))), np.zeros(len(z))
         person = new / (new + c.clutter_rate)
-        tracks = self.bank[kalman.PLACE], self.scale, self.existence() * self.measured
-        doubles = c.clutter_rate * DOUBLES / (2 * np.pi * DOUBLE_SPREAD**2) ** 2 / self.false_density
-        double = np.zeros(len(z))
-        for place, scale, owned in (tracks, (z, self._scale_of(z), person * free)):
-            weight = doubles * owned / np.square(scale)
-            kernels.add_doubles(double, z, place, DOUBLE_SPREAD * scale, weight, place is z)
+        kernels.add_doubles(double, z, self.bank[kalman.PLACE], self.scale, self.existence() * self.measured, False)
+        kernels.add_doubles(double, z, z, self._scale_of(z), person * free, True)
+        double *= c.clutter_rate * DOUBLES / (2 * np.pi * kernels.DOUBLE_SPREAD**2) ** 2 / self.false_density
         if len(z) or len(self.id):
             stay = np.exp(-self.dynamics.dt / existence.LIFETIME)
             self.unseen_time = stay * (1 - self.detect_prob) * self.unseen_time + self.dynamics.dt

@@ -19,18 +19,15 @@ LIKELY = 0.5  # least probability of a confirmed track, and of a reported box
 BODY = 0.35  # m: a box is right if its middle is so near to the person
 IN_FRONT = 0.15  # m in the image: whose feet are lower by more stands in front
 FARTHEST = 9.0  # standard deviations from which a density is taken as 0: it is below 1e-17
-SIDES = ((0, 3), (1, 2))  # columns of a box: centre and side, along x and along y
+DOUBLE_SPREAD = 0.3  # m: standard deviation of centre, height and width of a second box of a person
 
 
 @kernel
 def covered_share(box: Array, other: Array) -> float:
     """Returns the share, 0 to 1, of a box (4,) that lies in another box (4,)."""
-    shared = 1.0
-    for centre, side in SIDES:
-        low = max(box[centre] - box[side] / 2, other[centre] - other[side] / 2)
-        high = min(box[centre] + box[side] / 2, other[centre] + other[side] / 2)
-        shared *= max(high - low, 0.0)
-    return float(shared / max(box[2] * box[3], 1e-9))
+    wide = min(box[0] + box[3] / 2, other[0] + other[3] / 2) - max(box[0] - box[3] / 2, other[0] - other[3] / 2)
+    high = min(box[1] + box[2] / 2, other[1] + other[2] / 2) - max(box[1] - box[2] / 2, other[1] - other[2] / 2)
+    return float(max(wide, 0.0) * max(high, 0.0) / max(box[2] * box[3], 1e-9))
 
 
 @kernel
@@ -69,35 +66,36 @@ def visible_shares(boxes: Array, scale: Array, existence: Array, var: Array) -> 
 
 
 @kernel
-def pair_costs(rows: Ints, evidence: Array, ratio: Array, unowned: Array, detectable: Array, states: Array) -> Array:
+def pair_costs(rows: Ints, evidence: Array, ratio: Array, new: float, detectable: Array, states: Array) -> Array:
     """Returns ln p(missed, box is nobody's) - ln p(measured) of P pairs of tracks `rows` and boxes, (P,).
 
-    evidence (P,): ln of the box's density over that of false ones; ratio (P,): likelihood ratio of its score; unowned
-    (P,): likelihood of a box that is nobody's, over that of a false one. detectable (N,), states (3, N): of all tracks.
+    evidence (P,): ln of the box's density over that of false ones; ratio (P,): likelihood ratio of its score; new:
+    expected boxes of new people over that of false ones. detectable (N,), states (3, N): of all tracks.
     """
     cost = np.empty(len(rows))
     for k in range(len(rows)):
         p, shown, false = detectable[rows[k]], states[SHOWN, rows[k]], states[FALSE, rows[k]]
         missed, measured = 1 - p * (shown + false), p * (shown * ratio[k] + false)
-        cost[k] = np.log(missed * unowned[k]) - np.log(measured) - evidence[k]
+        cost[k] = np.log(missed * (1 + new * ratio[k])) - np.log(measured) - evidence[k]
     return cost
 
 
 @kernel
-def add_doubles(total: Array, boxes: Array, owners: Array, spread: Array, weight: Array, earlier: bool) -> None:
-    """Adds to `total` (M,), in place, the sum over the owners (N, 4) of weight (N,) times exp(-d^2 / 2).
+def add_doubles(total: Array, boxes: Array, owners: Array, scale: Array, owned: Array, earlier: bool) -> None:
+    """Adds to `total` (M,), in place, the sum over the owners (N, 4) of owned (N,) exp(-d^2 / 2) / scale (N,)^2.
 
-    d: distance of each of the boxes (M, 4) from the owner, in its standard deviation spread (N,), px. earlier: only of
-    owners with a smaller index than the box.
+    d: distance of each of the boxes (M, 4) from the owner, in DOUBLE_SPREAD times its scale. earlier: only of owners
+    with a smaller index than the box.
     """
     for j in range(len(owners)):
-        for i in range(j + 1 if earlier else 0, len(boxes) if weight[j] > 0 else 0):
-            if abs(boxes[i, 0] - owners[j, 0]) < FARTHEST * spread[j]:
+        spread = DOUBLE_SPREAD * scale[j]
+        for i in range(j + 1 if earlier else 0, len(boxes) if owned[j] > 0 else 0):
+            if abs(boxes[i, 0] - owners[j, 0]) < FARTHEST * spread:
                 d2 = 0.0
                 for axis in range(4):
-                    d2 += ((boxes[i, axis] - owners[j, axis]) / spread[j]) ** 2
+                    d2 += ((boxes[i, axis] - owners[j, axis]) / spread) ** 2
                 if d2 < FARTHEST**2:
-                    total[i] += weight[j] * np.exp(-0.5 * d2)
+                    total[i] += owned[j] / scale[j] ** 2 * np.exp(-0.5 * d2)
 
 
 @kernel
@@ -106,13 +104,11 @@ def reported(boxes: Array, bank: Array, existence: Array, measured: Bools, low: 
     view, from low to high (2,), px, while missed."""
     shown = np.empty(len(boxes), np.bool_)
     for i in range(len(boxes)):
-        right, leaves = 1.0 if measured[i] else well_placed(bank[VAR, i, 0]), False
-        for axis, side in SIDES:
-            rate, half = bank[RATE, i, axis], boxes[i, side] / 2
-            leaves |= (rate < 0 and boxes[i, axis] - half < low[axis]) or (
-                rate > 0 and boxes[i, axis] + half > high[axis]
-            )
-        shown[i] = existence[i] * right >= LIKELY and (measured[i] or not leaves)
+        shown[i] = existence[i] * (1.0 if measured[i] else well_placed(bank[VAR, i, 0])) >= LIKELY
+        for axis in range(2):
+            rate = bank[RATE, i, axis]
+            edge = boxes[i, axis] + np.sign(rate) * boxes[i, 3 - axis] / 2
+            shown[i] &= measured[i] or not ((rate < 0 and edge < low[axis]) or (rate > 0 and edge > high[axis]))
     return shown
 
 

@@ -39,8 +39,7 @@ class BoxUpdater:
         from scipy.special import chdtri
 
         self.gate, self.confirm_gate = chdtri(4, 1 - np.array([config.gate, CONFIRM_GATE]))  # eq. 10
-        stay = np.exp(-self.people.dynamics.dt / SIZE_RATE_TIME)
-        self.fading = kalman.fading(np.array([1.0, 1.0, stay, stay]))
+        self.fading = kalman.fading(np.exp(-self.people.dynamics.dt / SIZE_RATE_TIME * np.array([0, 0, 1, 1])))
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
         """Updates the tracks with a frame's detections: predict, associate, update, confirm, delete, start."""

@@ -47,24 +47,23 @@ def test_whoever_stands_in_front_hides(seed):
 @pytest.mark.parametrize("earlier", [False, True])
 def test_second_boxes_are_near_their_owners(earlier):
     r = np.random.default_rng(1)
-    boxes, spread, weight = boxes_of(r, 30), r.uniform(5, 30, 30), r.random(30) * (r.random(30) < 0.8)
-    d2 = np.square((boxes[:, None] - boxes) / spread[:, None]).sum(2)
-    known = np.exp(-d2 / 2) * weight * (np.tri(30, k=-1) if earlier else 1.0)
+    boxes, scale, owned = boxes_of(r, 30), r.uniform(20, 100, 30), r.random(30) * (r.random(30) < 0.8)
+    d2 = np.square((boxes[:, None] - boxes) / (0.3 * scale[:, None])).sum(2)
+    known = np.exp(-d2 / 2) * owned / np.square(scale) * (np.tri(30, k=-1) if earlier else 1.0)
     total = np.ones(30)
-    kernels.add_doubles(total, boxes, boxes, spread, weight, earlier)
+    kernels.add_doubles(total, boxes, boxes, scale, owned, earlier)
     assert total == pytest.approx(1 + known.sum(1), rel=1e-12)
 
 
 def test_a_pair_costs_less_the_likelier_it_is():
     r = np.random.default_rng(2)
     rows, p, states = np.array([0, 0, 2]), np.array([0.9, 0.5, 0.3]), r.dirichlet(np.ones(4), 3).T[:3]
-    evidence, ratio, unowned = r.normal(0, 2, (3, 3)).T
-    ratio, unowned = np.exp(ratio), 1 + np.exp(unowned)
+    evidence, ratio = r.normal(0, 2, 3), np.exp(r.normal(0, 2, 3))
     shown, false = states[existence.SHOWN, rows], states[existence.FALSE, rows]
     measured, missed = p[rows] * (shown * ratio + false) * np.exp(evidence), 1 - p[rows] * (shown + false)
-    cost = kernels.pair_costs(rows, evidence, ratio, unowned, p, states)
-    assert cost == pytest.approx(np.log(missed * unowned / measured))
-    assert kernels.pair_costs(rows, evidence, ratio, unowned, np.zeros(3), states).tolist() == [np.inf] * 3
+    cost = kernels.pair_costs(rows, evidence, ratio, 0.4, p, states)
+    assert cost == pytest.approx(np.log(missed * (1 + 0.4 * ratio) / measured))
+    assert kernels.pair_costs(rows, evidence, ratio, 0.4, np.zeros(3), states).tolist() == [np.inf] * 3
 
 
 @pytest.mark.parametrize("seed", range(4))
