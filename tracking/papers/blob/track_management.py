@@ -79,7 +79,7 @@ class TrackedPeople:
         stand (N, 5)        with a camera: where the person stands on the ground, x, y, vx, vy, and how tall the person
                             is, m and m/s; nan: above the horizon. stand_cov (N, 5, 5): covariance
         image (2, 2)        lower and higher corner x, y of the image, px; -inf and inf if its size is unknown
-        view_low, view_high (2,)   corners x, y of the field of view, px; inf and -inf before it is known
+        view (2, 2)         the same of the field of view; inf and -inf before it is known
     detect_prob: that of the config, 0 in a frame that was not observed; detectable (N,): probability that a person who
     exists and is shown is measured in this frame; rho (N,): with "rho", sqrt|S| (innovation covariance) over its
     asymptote, as predicted; unseen_time: s, BIRTH_RATE times it is the expected number of people in view without a
@@ -98,7 +98,7 @@ class TrackedPeople:
         self.top = context.camera is not None and context.camera.kind == "top"
         size = context.image_size
         self.image = np.full((2, 2), [[-np.inf], [np.inf]]) if size is None else np.array([(0.0, 0.0), size])
-        self.view_low, self.view_high = np.full(2, np.inf), np.full(2, -np.inf)
+        self.view = -self.image if size is None else self.image
         self.bank, self.id, self.next_id = np.zeros((5, 0, 4)), np.zeros(0, np.int64), 1
         self.scale, self.born, self.score = np.zeros((3, 0))
         self.confirmed, self.measured = np.zeros((2, 0), bool)
@@ -293,17 +293,16 @@ class TrackedPeople:
         """Returns the table positions (K,), ascending, of the tracks to report (ours)."""
         if not self.by_existence:
             return np.asarray(self.confirmed.nonzero()[0])
-        boxes, view = self.upright_boxes(), (self.view_low, self.view_high)
-        return kernels.reported(boxes, self.bank, self.existence(), self.measured, *view).nonzero()[0]
+        boxes, existence = self.upright_boxes(), self.existence()
+        return kernels.reported(boxes, self.bank, existence, self.measured, self.view).nonzero()[0]
 
     def widen_view(self, z: Array) -> None:
-        """Sets the field of view to the image, or, if its size is unknown, widens it to hold the boxes z (M, 4)."""
-        if self.context.image_size is not None:
-            self.view_low, self.view_high = self.image
-        elif len(z):
-            self.view_low = np.minimum(self.view_low, (z[:, :2] - z[:, :1:-1] / 2).min(0))
-            self.view_high = np.maximum(self.view_high, (z[:, :2] + z[:, :1:-1] / 2).max(0))
-        wide, high = np.maximum(self.view_high - self.view_low, LEAST_VIEW * self.px_per_m)
+        """Widens the field of view to hold the boxes z (M, 4) if the image's size is unknown, and computes the density
+        of false boxes in it."""
+        if self.context.image_size is None and len(z):
+            low, high = (z[:, :2] - z[:, :1:-1] / 2).min(0), (z[:, :2] + z[:, :1:-1] / 2).max(0)
+            self.view = np.array([np.minimum(self.view[0], low), np.maximum(self.view[1], high)])
+        wide, high = np.maximum(self.view[1] - self.view[0], LEAST_VIEW * self.px_per_m)
         self.false_density = self.config.clutter_rate / (wide * high) / (2 * np.pi * SIZE_SPREAD**2)
 
 

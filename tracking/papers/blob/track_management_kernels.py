@@ -56,12 +56,11 @@ def visible_shares(boxes: Array, scale: Array, existence: Array, var: Array) -> 
     for i in range(len(boxes)):
         hidden = 0.0
         for j in range(len(boxes)):
-            # few are so near in x: the branch that is hardly ever taken comes first, as it is foreseen by the processor
+            # few boxes are so near in x: the test that hardly ever succeeds comes first, so that the processor is right
             aside = 2 * abs(boxes[j, 0] - boxes[i, 0]) < boxes[i, 3] + boxes[j, 3]
             if aside and foot[j] - foot[i] > IN_FRONT * scale[i]:
                 hidden = max(hidden, covered_share(boxes[i], boxes[j]) * existence[j])
-        if hidden > 0:
-            share[i] -= hidden * well_placed(var[i, 0])
+        share[i] -= hidden * well_placed(var[i, 0])
     return share
 
 
@@ -99,16 +98,16 @@ def add_doubles(total: Array, boxes: Array, owners: Array, scale: Array, owned: 
 
 
 @kernel
-def reported(boxes: Array, bank: Array, existence: Array, measured: Bools, low: Array, high: Array) -> Bools:
+def reported(boxes: Array, bank: Array, existence: Array, measured: Bools, view: Array) -> Bools:
     """Returns flags (N,): True if a person's box is right with the probability LIKELY, and not leaving the field of
-    view, from low to high (2,), px, while missed."""
+    view, from x, y view[0] to view[1], px, while missed."""
     shown = np.empty(len(boxes), np.bool_)
     for i in range(len(boxes)):
         shown[i] = existence[i] * (1.0 if measured[i] else well_placed(bank[VAR, i, 0])) >= LIKELY
         for axis in range(2):
             rate = bank[RATE, i, axis]
             edge = boxes[i, axis] + np.sign(rate) * boxes[i, 3 - axis] / 2
-            shown[i] &= measured[i] or not ((rate < 0 and edge < low[axis]) or (rate > 0 and edge > high[axis]))
+            shown[i] &= measured[i] or not ((rate < 0 and edge < view[0, axis]) or (rate > 0 and edge > view[1, axis]))
     return shown
 
 

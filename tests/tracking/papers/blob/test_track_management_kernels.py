@@ -9,7 +9,7 @@ from scipy.special import erf
 from tracking.filters import existence, kalman
 from tracking.papers.blob import track_management_kernels as kernels
 
-VIEW = np.zeros(2), np.array([300.0, 200.0])
+VIEW = np.array([[0.0, 0.0], [300.0, 200.0]])
 
 
 def boxes_of(r, n):
@@ -77,4 +77,4 @@ def test_who_leaves_the_view_or_may_be_elsewhere_is_not_reported_while_missed(se
     right = np.where(measured, 1.0, erf(0.35 / np.sqrt(2 * bank[kalman.VAR, :, 0])))
     expected = (person * right >= 0.5) & (measured | ~leaves)
     assert (leaves & ~measured & (person * right >= 0.5)).any()
-    assert kernels.reported(boxes, bank, person, measured, *VIEW).tolist() == expected.tolist()
+    assert kernels.reported(boxes, bank, person, measured, VIEW).tolist() == expected.tolist()
