@@ -30,7 +30,7 @@ from benchmarks.support.replaced_code import Replacement, replaced_code
 from benchmarks.support.tables import difference_cell, head, row
 from tracking.filters import existence
 from tracking.papers.blob import track_management, update_from_boxes
-from tracking.papers.blob.track_management import TrackedPeople
+from tracking.papers.blob import track_management_kernels as kernels
 from tracking.recordings.source import open_source
 
 DOUBLED = 0.1
@@ -41,14 +41,15 @@ CHANGES: dict[str, dict[str, object]] = {
     "`detect_prob` 0.7": {"detect_prob": 0.7},
     "`clutter_rate` 2 /frame": {"clutter_rate": 2.0},
 }
+REPORTED, SURE = kernels.reported, np.array([1.0, 1.0, 0.0, 1.0, 1.0])[:, None, None]  # without variance of places
 PARTS: dict[str, Replacement] = {
     "scores not learned": (existence, "LEARNED", 0),
     "no spells without detection": (existence, "SHOWN_TIME", 1e9),
     "false boxes last 0.15 s": (existence, "CLUTTER_TIME", 0.15),
-    "nobody hides anybody": (TrackedPeople, "visible_shares", lambda people: np.ones(len(people.id))),
+    "nobody hides anybody": (kernels, "visible_shares", lambda boxes, *_: np.ones(len(boxes))),
     "no second boxes": (track_management, "DOUBLES", 0.0),
     "sizes change on": (update_from_boxes, "SIZE_RATE_TIME", 1e9),
-    "reported while they exist": (track_management, "BODY", 1e9),
+    "reported while they exist": (kernels, "reported", lambda boxes, bank, *more: REPORTED(boxes, bank * SURE, *more)),
 }
 
 

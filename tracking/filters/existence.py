@@ -47,18 +47,18 @@ def transition(dt: float, hidden_time: float) -> Array:
 def newborn(person: Array) -> Array:
     """Returns the probabilities (3, K) of the states shown, hidden and false of K new tracks; person (K,): probability
     that each is a person, who is then shown."""
-    return np.stack([person, np.zeros_like(person), 1 - person])
+    return np.array([person, 0 * person, 1 - person])
 
 
 def update(states: Array, rows: Ints, p: Array, g: Array, ratio: Array | float) -> None:
     """Updates the probabilities `states` (3, N) in place: tracks at `rows` (K,) were measured, all others missed. p
     (N,): probability of detection; g (K,): density of the measurement over that of false ones; ratio: of scores."""
-    likelihood = np.ones_like(states)
-    likelihood[SHOWN] = likelihood[FALSE] = 1 - p
-    likelihood[SHOWN, rows] += p[rows] * g * ratio
-    likelihood[FALSE, rows] += p[rows] * g
-    nothing = 1 - states.sum(0)
-    states *= likelihood
+    nothing, shown, false = 1 - states.sum(0), 1 - p, 1 - p
+    measured = p[rows] * g
+    shown[rows] += measured * ratio
+    false[rows] += measured
+    states[SHOWN] *= shown
+    states[FALSE] *= false
     states /= states.sum(0) + nothing
 
 

@@ -35,8 +35,7 @@ def white_acceleration(dt: float, sigma: Array | float) -> Array:
     from filterpy.common import Q_discrete_white_noise
 
     unit = Q_discrete_white_noise(2, dt)
-    q = np.square(np.asarray(sigma, float))
-    return np.stack([q * unit[0, 0], q * unit[0, 1], q * unit[1, 1]])
+    return np.asarray(np.multiply.outer(unit[[0, 0, 1], [0, 1, 1]], np.square(sigma)))
 
 
 def constant_velocity(dt: float, axes: int) -> tuple[Array, Array]:
@@ -67,11 +66,10 @@ def predict(state: Array, dt: float, q: Array) -> None:
     state[VAR:] += q if q.ndim == 3 else q[:, None]
 
 
-def fade_rates(state: Array, stay: float) -> None:
-    """Multiplies the rates of a bank by `stay`, 0 to 1, and their (co)variances accordingly, in place."""
-    state[RATE] *= stay
-    state[COV] *= stay
-    state[RATE_VAR] *= stay**2
+def fading(stay: Array) -> Array:
+    """Returns the factors (5, 1, D) of a bank by which rates are multiplied by `stay` (D,), 0 to 1, and their
+    (co)variances accordingly."""
+    return np.stack([np.ones_like(stay), stay, np.ones_like(stay), stay, stay**2])[:, None]
 
 
 def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
@@ -92,25 +90,6 @@ def update(state: Array, rows: Ints, z: Array, noise: Array | float) -> Array:
     cov -= gain * cov
     state[:, rows] = new
     return np.asarray(y * y / s)
-
-
-def distances(state: Array, z: Array, noise: Array | float, scale: Array | float = 1.0) -> Array:
-    """Returns squared Mahalanobis distances (N, M) of N predicted filters and M measurements z (M, D) (eq. 9).
-
-    noise: variance of all measurements, (D,) or a number. scale: units of z per square root of the covariances' unit
-    (px per m), (N,) or a number.
-    """
-    place, w = state[PLACE], 1.0 / ((state[VAR] + noise) * np.reshape(np.square(scale), (-1, 1)))
-    if not len(place) or not len(z):
-        return np.zeros((len(place), len(z)))
-    # matrix products are several times faster than (N, M, D) arrays
-    # relative to the first measurement, so that little precision cancels in p² - 2 p m + m²
-    p, m = place - z[0], z - z[0]
-    pw = p * w
-    d2 = w @ (m * m).T
-    d2 -= pw @ (m + m).T
-    d2 += np.einsum("nd,nd->n", pw, p)[:, None]
-    return np.asarray(np.maximum(d2, 0.0, out=d2))
 
 
 def asymptote(dt: float, sigma: Array | float, noise: Array | float) -> Array:

@@ -56,10 +56,9 @@ class Dynamics:
         s = self.asymptote
         k = 1 - self.noise / s
         rate_gain = 2 * (2 - k) - 4 * np.sqrt(1 - k)
-        state = np.zeros((5, 1, len(self.noise)))
-        state[kalman.VAR] = k * self.noise
+        rate_var = rate_gain / self.dt**2 * (k - rate_gain / 2) / (1 - k) * self.noise
+        state = kalman.born(np.zeros((1, len(self.noise))), k * self.noise, rate_var)
         state[kalman.COV] = rate_gain * self.noise / self.dt
-        state[kalman.RATE_VAR] = rate_gain / self.dt**2 * (k - rate_gain / 2) / (1 - k) * self.noise
         return state
 
 

@@ -84,7 +84,6 @@ def _faults(tracks: Any, index: int, history: ReportHistory) -> Iterator[Any]:
     rows = {"id": ("i", n), "group": ("i", n), "seen": ("b", n), "score": ("f", n), "pos": ("f", n, d)}
     rows |= {"vel": ("f", n, d), "cov": ("f", n, 2 * d, 2 * d)}
     yield from _array_faults(tracks, "", rows if tracks.box is None else {**rows, "box": ("f", n, 4)}, ("vel",))
-    yield bool(np.isinf(tracks.vel).any()) and ("infinity in vel", "finite numbers, or nan for unknown")
     same = tracks.unit != "group" or np.array_equal(tracks.id, tracks.group)
     yield not same and ("group that is not id", "group equal to id where the unit is group")
     yield bool((tracks.group < -1).any()) and (f"group {tracks.group.min()}", "non-negative groups, -1 alone")

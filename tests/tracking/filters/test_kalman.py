@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import linear_sum_assignment
 from scipy.special import chdtri
 
 from tests.reference_tracking import best_pairing, filterpy_bank, riccati_innovation
 from tracking.filters import assignment, kalman
+from tracking.filters.kalman_kernels import distances
 
 
 def make(r, n=5, d=4):
@@ -29,7 +31,8 @@ def test_bank_equals_filterpy_over_random_misses(seed):
         rows = np.flatnonzero(r.random(len(place)) < 0.6)
         z = r.normal(0, 10, (len(rows), 4))
         own_noise = noise * r.uniform(0.5, 2, (len(rows), 1))
-        d2 = [kalman.distances(bank[:, [row]], z[[k]], own_noise[k])[0, 0] for k, row in enumerate(rows)]
+        s = bank[kalman.VAR, rows] + own_noise
+        d2 = distances(bank[kalman.PLACE, rows], s, z, np.ones(len(rows)))[0].diagonal()
         terms = kalman.update(bank, rows, z, own_noise)
         for f in filters:
             f.predict()
@@ -53,7 +56,7 @@ def test_fading_rates_is_the_transition_of_a_decaying_rate():
     kalman.predict(bank, dt, kalman.white_acceleration(dt, sigma))
     kalman.update(bank, np.arange(len(place)), r.normal(0, 10, place.shape), noise)
     x, rate, *p = bank.copy()
-    kalman.fade_rates(bank, 0.6)
+    bank *= kalman.fading(np.full(4, 0.6))
     fade = np.diag([1.0, 0.6])
     expected = np.einsum("ij,jkab,kl->ilab", fade, np.array([[p[0], p[1]], [p[1], p[2]]]), fade)
     assert np.allclose(bank, [x, 0.6 * rate, expected[0, 0], expected[0, 1], expected[1, 1]], rtol=1e-12)
@@ -79,7 +82,9 @@ def test_gate_holds_its_share(p):
     bank = kalman.born(r.normal(0, 5, (1, 4)), r.uniform(0.1, 2, 4), 1.0)
     noise, n = r.uniform(0.1, 2, 4), 100_000
     z = bank[kalman.PLACE] + r.normal(size=(n, 4)) * np.sqrt(bank[kalman.VAR] + noise)
-    share = np.mean(kalman.distances(bank, z, noise)[0] <= chdtri(4, 1 - p))
+    d2, log_det = distances(bank[kalman.PLACE], bank[kalman.VAR] + noise, z, np.ones(1))
+    share = np.mean(d2 <= chdtri(4, 1 - p))
+    assert log_det == pytest.approx(np.linalg.slogdet(2 * np.pi * np.diag(bank[kalman.VAR, 0] + noise))[1])
     assert abs(share - p) < 3 * np.sqrt(p * (1 - p) / n)
 
 
@@ -100,10 +105,15 @@ def test_angle_follows_an_ellipse_round(flip):
 
 
 def test_nearest_takes_each_measurement_to_its_deepest_gate():
-    cost = np.array([[1.0, 4.0, np.inf, np.inf], [2.0, 3.0, np.inf, 0.5]])
-    rows, columns = assignment.nearest(cost)
-    assert rows.tolist() == [0, 1, 1]
-    assert columns.tolist() == [0, 1, 3]
+    rows, columns = np.array([0, 0, 1, 1, 1]), np.array([0, 1, 0, 1, 3])
+    best = assignment.cheapest(columns, np.array([1.0, 4.0, 2.0, 3.0, 0.5]), rows)
+    assert rows[best].tolist() == [0, 1, 1]
+    assert columns[best].tolist() == [0, 1, 3]
+
+
+def test_of_equal_costs_the_first_wins():
+    of, ties = np.array([3, 3, 3, 7]), np.array([2, 0, 1, 5])
+    assert assignment.cheapest(of, np.ones(4), ties).tolist() == [1, 3]
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -119,8 +129,19 @@ def test_optimal_is_the_best_of_all_pairings(seed):
     assert total == pytest.approx(best_pairing(np.minimum(cost, 1e6), 10.0))
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_pairs_that_nobody_contests_change_no_assignment(seed):
+    """Beside the search over the whole table."""
+    r = np.random.default_rng(seed)
+    cost = np.where(r.random((40, 50)) < 0.03, r.uniform(-5, 0, (40, 50)), 0.0)
+    rows, columns = cost.nonzero()
+    best = assignment.one_to_one(rows, columns, cost[rows, columns])
+    assert 10 < len(best) < len(rows)
+    every = linear_sum_assignment(cost)
+    assert set(zip(rows[best], columns[best], strict=True)) == {pair for pair in zip(*every, strict=True) if cost[pair]}
+
+
 @pytest.mark.parametrize("shape", [(0, 3), (3, 0), (0, 0), (2, 2)])
 def test_nothing_in_any_gate(shape):
-    cost = np.full(shape, np.inf)
-    for rows, columns in (assignment.nearest(cost), assignment.optimal(cost, 5.0)):
-        assert len(rows) == len(columns) == 0
+    rows, columns = assignment.optimal(np.full(shape, np.inf), 5.0)
+    assert len(rows) == len(columns) == len(assignment.cheapest(rows, np.zeros(0), columns)) == 0

@@ -1,4 +1,4 @@
-"""Geometry of boxes as `blob` measures them: conversion and overlap.
+"""Geometry of boxes as `blob` measures them: conversions.
 
 A centred box is (x, y, h, w): centre, height, width, px. A detection's box is (left, top, width, height), px.
 """
@@ -38,14 +38,3 @@ def centred(standing_box: Array) -> Array:
     """Returns centred boxes (N, 4): centre x, y, height, width, px, of boxes (N, 4): x, foot (row of the lower edge),
     height, width, px."""
     return np.asarray(standing_box - standing_box[:, 2:3] * np.array([0.0, 0.5, 0.0, 0.0]))
-
-
-def covered_share(place: Array, others: Array) -> Array:
-    """Returns the share (N, M), 0 to 1, of each box of `place` (N, 4) that lies in each box of `others` (M, 4)."""
-    shared = np.ones((len(place), len(others)))
-    for centre, side in ((0, 3), (1, 2)):
-        half, other_half = place[:, side, None] / 2, others[:, side] / 2
-        low = np.maximum(place[:, centre, None] - half, others[:, centre] - other_half)
-        high = np.minimum(place[:, centre, None] + half, others[:, centre] + other_half)
-        shared *= np.maximum(high - low, 0.0)
-    return np.asarray(shared / np.maximum(place[:, 2] * place[:, 3], 1e-9)[:, None])

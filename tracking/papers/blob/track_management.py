@@ -37,21 +37,18 @@ from sim.scene.standing import standing_points
 from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Camera, Context, Ints
 from tracking.detect.person_size import upright
-from tracking.filters import assignment, existence, kalman, track_uncertainty
+from tracking.filters import assignment, existence, kalman, kalman_kernels, track_uncertainty
 from tracking.papers.blob import box_geometry, person_look_kernels
+from tracking.papers.blob import track_management_kernels as kernels
 from tracking.papers.blob.config import BlobConfig
 
 # Relative margin of rho, with which deletion comes earlier, so that filters near their steady state count as in it.
 SLACK = 0.02
 LARGEST_SCALE = 2.0  # largest scale of a track relative to the sequence's; the least is its inverse
-LIKELY = 0.5  # least probability of a confirmed track, and of a reported box
 LEAST_EXISTENCE = 0.01  # a track with a lower existence probability is deleted, or not started
-BODY = 0.35  # m: a box is right if its middle is so near to the person
-IN_FRONT = 0.15  # m in the image: whose feet are lower by more stands in front
 SIZE_SPREAD = 0.3  # m: standard deviation of height and width of false boxes
 LEAST_VIEW = 5.0  # m: least width and height of the field of view
 DOUBLES = 0.05  # boxes per frame that a person has beside the own one, on average
-DOUBLE_SPREAD = 0.3  # m: standard deviation of centre, height and width of such a box
 HEIGHT_SPREAD = 0.1  # m: standard deviation of people's heights
 PLACE_SPREAD = 10.0  # m: standard deviation of the place on the ground before the first box
 NUDGE = 1e-4  # m: step of the numerical derivatives of `seen_boxes`
@@ -74,8 +71,6 @@ class TrackedPeople:
         bank (5, N, 4)      Kalman filters of x, y, h, w (tracking.filters.kalman); places px, covariances m^2
         id (N,)             never used again; next_id: that of the next track, from 1
         scale (N,)          px per m
-        rho (N,)            uncertainty: sqrt|S| (innovation covariance) over its asymptote at the last prediction,
-                            in the frame of birth that of every new track
         born (N,)           time of the first measurement, s
         score (N,)          score of the last measurement, 0 to 1; from pixels its support
         states (3, N)       probabilities of a person who is shown, who is not, and of a false object (existence)
@@ -83,27 +78,33 @@ class TrackedPeople:
         measured (N,)       True if measured in this frame
         stand (N, 5)        with a camera: where the person stands on the ground, x, y, vx, vy, and how tall the person
                             is, m and m/s; nan: above the horizon. stand_cov (N, 5, 5): covariance
-        view_low, view_high (2,)   corners x, y of the field of view, px; inf and -inf before it is known
+        image (2, 2)        lower and higher corner x, y of the image, px; -inf and inf if its size is unknown
+        view (2, 2)         the same of the field of view; inf and -inf before it is known
     detect_prob: that of the config, 0 in a frame that was not observed; detectable (N,): probability that a person who
-    exists and is shown is measured in this frame; unseen_time: s, BIRTH_RATE times it is the expected number of people
-    in view without a track; px_per_m: the image's scale; from pixels that of the frame. Also config, context, dynamics
-    (the nominal filter), top (True from straight above), and what `follow` derives.
+    exists and is shown is measured in this frame; rho (N,): with "rho", sqrt|S| (innovation covariance) over its
+    asymptote, as predicted; unseen_time: s, BIRTH_RATE times it is the expected number of people in view without a
+    track; false_density: expected false boxes in this frame per px^2 of place and m^2 of size; px_per_m: the image's
+    scale; from pixels that of the frame. Also config, context, dynamics (the nominal filter), top (True from straight
+    above), and what `follow` derives.
     """
 
     # Axis of the tracks in each column of the table.
     columns: ClassVar[dict[str, int]] = {
-        "bank": 1, "id": 0, "scale": 0, "rho": 0, "born": 0, "score": 0, "states": 1, "confirmed": 0, "measured": 0,
-        "stand": 0, "stand_cov": 0,
+        "bank": 1, "id": 0, "scale": 0, "born": 0, "score": 0, "states": 1, "confirmed": 0, "measured": 0
     }  # fmt: skip
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
         self.context, self.px_per_m = context, context.px_per_m
         self.top = context.camera is not None and context.camera.kind == "top"
-        self.view_low, self.view_high = np.full(2, np.inf), np.full(2, -np.inf)
+        size = context.image_size
+        self.image = np.full((2, 2), [[-np.inf], [np.inf]]) if size is None else np.array([(0.0, 0.0), size])
+        self.view = -self.image if size is None else self.image
         self.bank, self.id, self.next_id = np.zeros((5, 0, 4)), np.zeros(0, np.int64), 1
-        self.scale, self.rho, self.born, self.score, self.detectable = np.zeros((5, 0))
+        self.scale, self.born, self.score = np.zeros((3, 0))
         self.confirmed, self.measured = np.zeros((2, 0), bool)
-        self.stand, self.stand_cov = np.zeros((0, 5)), np.zeros((0, 5, 5))
+        if context.camera is not None:
+            self.stand, self.stand_cov = np.zeros((0, 5)), np.zeros((0, 5, 5))
+            self.columns = {**self.columns, "stand": 0, "stand_cov": 0}  # type: ignore[misc]
         self.states, self.unseen_time = np.zeros((3, 0)), existence.LIFETIME
         self.follow(config, dynamics)
 
@@ -130,10 +131,13 @@ class TrackedPeople:
         if self.context.camera is not None:
             self.stand = self.stand @ self.walk.T
             self.stand_cov = self.walk @ self.stand_cov @ self.walk.T + self.walk_noise
-        self.rho[:] = self.compute_rho()
+        if not self.by_existence:
+            self.rho = self.compute_rho()
         self.states[:] = self.transition @ self.states
         self.detect_prob = observed * self.config.detect_prob
-        self.detectable = self.detect_prob * self.visible_shares()
+        boxes, var = self.upright_boxes(), self.bank[kalman.VAR]
+        shown = 1.0 if self.top else kernels.visible_shares(boxes, self.scale, self.existence(), var)
+        self.detectable = self.detect_prob * shown * np.ones(len(self.id))
 
     def compute_rho(self) -> Array:
         """Returns rho (N,) of all tracks as predicted: sqrt|S| over its asymptote, S the innovation covariance; 1 in
@@ -149,50 +153,28 @@ class TrackedPeople:
         """Returns the existence probability (N,) of all tracks."""
         return np.asarray(self.states[existence.SHOWN] + self.states[existence.HIDDEN])
 
-    def visible_shares(self) -> Array:
-        """Returns the share (N,) of each person's box that no other person in front covers, as far as places are
-        known."""
-        if self.top or len(self.id) < 2:
-            return np.ones(len(self.id))
-        place = self.upright_boxes()
-        foot = place[:, 1] + place[:, 2] / 2
-        in_front = foot - foot[:, None] > IN_FRONT * self.scale[:, None]
-        covered = np.where(in_front, box_geometry.covered_share(place, place), 0.0) * self.existence()
-        return np.asarray(1 - covered.max(1) * self._well_placed())
-
-    def _well_placed(self) -> Array:
-        from scipy.special import erf
-
-        return np.asarray(erf(BODY / np.sqrt(2 * self.bank[kalman.VAR, :, 0])))
-
     def innovations(self, z: Array) -> tuple[Array, Array]:
-        """Returns d^2 (N, M) (eq. 9), and ln |2 pi S| (N, 1), in m, of N tracks and M boxes z (M, 4)."""
-        s = self.bank[kalman.VAR] + self.noise
-        return kalman.distances(self.bank, z, self.noise, self.scale), np.log(2 * np.pi * s).sum(1)[:, None]
+        """Returns d^2 (N, M) (eq. 9), and ln |2 pi S| (N,), in m, of N tracks and M boxes z (M, 4)."""
+        return kalman_kernels.distances(self.bank[kalman.PLACE], self.bank[kalman.VAR] + self.noise, z, self.scale)
 
-    def evidence(self, d2: Array, log_det: Array) -> Array:
-        """Returns ln N(z; z_pred, S) (N, M) over the density of false boxes, from d^2 and ln |2 pi S|."""
-        return np.asarray(-0.5 * (d2 + log_det) - np.log(self._false_density(self.scale))[:, None])
+    def evidence(self, rows: Ints, d2: Array, log_det: Array) -> Array:
+        """Returns ln N(z; z_pred, S) over the density of false boxes, of P pairs of tracks `rows` and boxes, from d^2
+        and ln |2 pi S|; all (P,)."""
+        return np.asarray(-0.5 * (d2 + log_det) - np.log(self.false_density * np.square(self.scale[rows])))
 
-    def _false_density(self, scale: Array) -> Array:
-        area = np.prod(np.maximum(self.view_high - self.view_low, LEAST_VIEW * self.px_per_m))
-        return np.asarray(self.config.clutter_rate * np.square(scale) / area / (2 * np.pi * SIZE_SPREAD**2))
-
-    def associate(self, d2: Array, evidence: Array, ratio: Array | float = 1.0) -> tuple[Ints, Ints]:
-        """Returns rows and columns (K,) of associated tracks and measurements, one to one. d2, evidence (N, M): as of
-        `innovations` and `evidence`; inf in d2 forbids a pair. ratio: likelihood ratio of the score, (M,)."""
+    def associate(self, rows: Ints, columns: Ints, d2: Array, evidence: Array, ratio: Array | float = 1.0) -> Ints:
+        """Returns the indices (K,) of the associated pairs, one to one, of P pairs of tracks `rows` and measurements
+        `columns`, row by row. d2, evidence (P,): of `innovations` and `evidence`; ratio (P,): of the score."""
         if not self.by_existence:
-            return assignment.cheapest_per_track(*assignment.nearest(d2), d2)
-        c, (shown, _, false) = self.config, self.states
-        measured = self.detectable[:, None] * (shown[:, None] * ratio + false[:, None])
-        missed = (1 - self.detectable * (shown + false))[:, None]
-        unowned = 1 + self._new_people(ratio) / c.clutter_rate
-        with np.errstate(divide="ignore"):
-            cost = np.log(missed * unowned) - np.log(measured) - evidence
-        return assignment.optimal(np.where(np.isfinite(d2), cost, np.inf), 0.0)
+            best = assignment.cheapest(columns, d2, rows)
+            return best[assignment.cheapest(rows[best], d2[best], columns[best])]
+        new, ratio = self._new_people() / self.config.clutter_rate, ratio * np.ones(len(rows))
+        cost = kernels.pair_costs(rows, evidence, ratio, new, self.detectable, self.states)
+        likely = np.flatnonzero(cost < 0)
+        return likely[assignment.one_to_one(rows[likely], columns[likely], cost[likely])]
 
-    def _new_people(self, ratio: Array | float) -> Array | float:
-        return existence.BIRTH_RATE * self.unseen_time * self.config.detect_prob * ratio
+    def _new_people(self) -> float:
+        return existence.BIRTH_RATE * self.unseen_time * self.config.detect_prob
 
     def record_measured(
         self, rows: Ints, near: Bools, score: Array, evidence: Array, ratio: Array | float = 1.0
@@ -205,7 +187,7 @@ class TrackedPeople:
         self.scale[:] = self._scale_of(self.bank[kalman.PLACE])
         if self.by_existence:
             existence.update(self.states, rows, self.detectable, np.exp(evidence), ratio)
-            self.confirmed[:] = self.existence() >= LIKELY
+            self.confirmed[:] = self.existence() >= kernels.LIKELY
         else:
             self.confirmed[rows] |= near & (self.rho[rows] <= self.config.confirm_ratio)
 
@@ -250,7 +232,7 @@ class TrackedPeople:
         if self.top:
             return np.full(len(place), whole)
         size = np.maximum(place[:, 2], place[:, 3]) / PERSON_HEIGHT
-        return np.asarray(np.clip(size, whole / LARGEST_SCALE, whole * LARGEST_SCALE))
+        return np.asarray(np.minimum(np.maximum(size, whole / LARGEST_SCALE), whole * LARGEST_SCALE))
 
     def new_people(self, z: Array, free: Bools, ratio: Array | float = 1.0) -> Array:
         """Returns the probability (M,) that each box z (M, 4), as no track's, is of a person without a track.
@@ -258,14 +240,11 @@ class TrackedPeople:
         It may also be false, or a second box of a measured person or of an earlier one of the boxes `free` (M,), which
         no track has. Also counts the people without a track.
         """
-        c, new = self.config, self._new_people(ratio)
-        person = new / (new + c.clutter_rate) * np.ones(len(z))
-        earlier = np.tri(len(z), k=-1) * np.where(free, person, 0.0)
-        owned = np.concatenate([np.tile(self.existence() * self.measured, (len(z), 1)), earlier], 1)
-        place, scale = np.concatenate([self.bank[kalman.PLACE], z]), np.concatenate([self.scale, self._scale_of(z)])
-        d2 = np.square((z[:, None] - place) / (DOUBLE_SPREAD * scale[:, None])).sum(2)
-        density = np.exp(-0.5 * d2) / (2 * np.pi * DOUBLE_SPREAD**2) ** 2 / self._false_density(scale)
-        double = c.clutter_rate * DOUBLES * (density * owned).sum(1)
+        c, new, double = self.config, self._new_people() * (ratio * np.ones(len(z))), np.zeros(len(z))
+        person = new / (new + c.clutter_rate)
+        kernels.add_doubles(double, z, self.bank[kalman.PLACE], self.scale, self.existence() * self.measured, False)
+        kernels.add_doubles(double, z, z, self._scale_of(z), person * free, True)
+        double *= c.clutter_rate * DOUBLES / (2 * np.pi * kernels.DOUBLE_SPREAD**2) ** 2 / self.false_density
         if len(z) or len(self.id):
             stay = np.exp(-self.dynamics.dt / existence.LIFETIME)
             self.unseen_time = stay * (1 - self.detect_prob) * self.unseen_time + self.dynamics.dt
@@ -274,7 +253,8 @@ class TrackedPeople:
     def delete_tracks(self, t: float) -> None:
         """Deletes tracks from the table at time t, s (sec. 5, and ours)."""
         unseen = ~self.measured
-        over = unseen & self._outside(self.bank[kalman.PLACE])
+        place = self.bank[kalman.PLACE, :, :2]
+        over = unseen & ((place < self.image[0]) | (place > self.image[1])).any(1)
         if self.by_existence:
             over |= self.existence() < LEAST_EXISTENCE
         else:
@@ -289,11 +269,6 @@ class TrackedPeople:
         for name, axis in self.columns.items():
             setattr(self, name, getattr(self, name).take(rows, axis))
 
-    def _outside(self, place: Array) -> Bools:
-        if self.context.image_size is None:
-            return np.zeros(len(place), bool)
-        return np.asarray(((place[:, :2] < 0) | (place[:, :2] > self.context.image_size)).any(1))
-
     def start_tracks(self, z: Array, score: Array, t: float, person: Array) -> None:
         """Appends a track at rest for each box z (K, 4): centre x, y, height, width, px; person (K,): probability that
         it is one."""
@@ -302,11 +277,12 @@ class TrackedPeople:
             return
         self._append(
             bank=kalman.born(z[:, :4], self.noise, self.dynamics.birth_rate_var),
-            id=np.arange(self.next_id, self.next_id + n), scale=self._scale_of(z), rho=np.full(n, self.birth_rho),
-            born=np.full(n, t), score=score, states=existence.newborn(person),
-            confirmed=self.by_existence & (person >= LIKELY), measured=np.ones(n, bool),
-            stand=np.full((n, 5), np.nan), stand_cov=np.full((n, 5, 5), np.nan),
+            id=np.arange(self.next_id, self.next_id + n), scale=self._scale_of(z), born=np.full(n, t), score=score,
+            states=existence.newborn(person),
+            confirmed=self.by_existence & (person >= kernels.LIKELY), measured=np.ones(n, bool),
         )  # fmt: skip
+        if self.context.camera is not None:
+            self._append(stand=np.full((n, 5), np.nan), stand_cov=np.full((n, 5, 5), np.nan))
         self.next_id += n
 
     def _append(self, **new: Array | Ints | Bools) -> None:
@@ -317,22 +293,17 @@ class TrackedPeople:
         """Returns the table positions (K,), ascending, of the tracks to report (ours)."""
         if not self.by_existence:
             return np.asarray(self.confirmed.nonzero()[0])
-        right = self.existence() * np.where(self.measured, 1.0, self._well_placed()) >= LIKELY
-        return np.asarray((right & (self.measured | ~self._leaving())).nonzero()[0])
+        boxes, existence = self.upright_boxes(), self.existence()
+        return kernels.reported(boxes, self.bank, existence, self.measured, self.view).nonzero()[0]
 
     def widen_view(self, z: Array) -> None:
-        """Sets the field of view to the image, or, if its size is unknown, widens it to hold the boxes z (M, 4)."""
-        if self.context.image_size is not None:
-            self.view_low, self.view_high = np.zeros(2), np.array(self.context.image_size, float)
-        elif len(z):
-            self.view_low = np.minimum(self.view_low, (z[:, :2] - z[:, :1:-1] / 2).min(0))
-            self.view_high = np.maximum(self.view_high, (z[:, :2] + z[:, :1:-1] / 2).max(0))
-
-    def _leaving(self) -> Bools:
-        place, rate = self.upright_boxes(), self.bank[kalman.RATE, :, :2]
-        centre, half = place[:, :2], place[:, :1:-1] / 2
-        out = ((centre - half < self.view_low) & (rate < 0)) | ((centre + half > self.view_high) & (rate > 0))
-        return np.asarray(out.any(1))
+        """Widens the field of view to hold the boxes z (M, 4) if the image's size is unknown, and computes the density
+        of false boxes in it."""
+        if self.context.image_size is None and len(z):
+            low, high = (z[:, :2] - z[:, :1:-1] / 2).min(0), (z[:, :2] + z[:, :1:-1] / 2).max(0)
+            self.view = np.array([np.minimum(self.view[0], low), np.maximum(self.view[1], high)])
+        wide, high = np.maximum(self.view[1] - self.view[0], LEAST_VIEW * self.px_per_m)
+        self.false_density = self.config.clutter_rate / (wide * high) / (2 * np.pi * SIZE_SPREAD**2)
 
 
 ANGLE_RATE = 15.0  # deg/s^0.5, random walk of the direction: its standard deviation after one second
@@ -397,9 +368,10 @@ class TrackedEllipses(TrackedPeople):
     def directed_innovations(self, z: Array, angle_var: Array) -> tuple[Array, Array]:
         """Returns d^2 (eq. 9) and ln |2 pi S|, (N, M) each, of N tracks and M ellipses; a direction counts relative to
         a uniform one."""
-        d2, log_det = self.innovations(z[:, :4])
+        d2, log_det = self.innovations(np.ascontiguousarray(z[:, :4]))
         angle_s = self.angle[kalman.DIRECTION_VAR][:, None] + np.where(kalman.directed(angle_var), angle_var, np.inf)
-        return d2 + self.direction_distances(z[:, 4], angle_var), log_det + np.log(np.minimum(2 / np.pi * angle_s, 1.0))
+        turned = np.log(np.minimum(2 / np.pi * angle_s, 1.0))
+        return d2 + self.direction_distances(z[:, 4], angle_var), log_det[:, None] + turned
 
     def update(self, rows: Ints, z: Array, noise: Array, angle_var: Array) -> Array:
         """Updates the tracks at table positions `rows` (K,), each at most once, with ellipses z (K, 5), in place (eqs 3

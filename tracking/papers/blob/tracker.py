@@ -111,11 +111,12 @@ from typing import TYPE_CHECKING, ClassVar, cast
 
 import numpy as np
 
-from sim.types import Array, Context, Detections, Frame, Plane, Tracks
+from sim.types import Context, Detections, Frame, Plane, Tracks
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.track_management import TrackedEllipses, TrackedPeople
+from tracking.papers.blob.track_management_kernels import image_covariance
 from tracking.papers.blob.update_from_boxes import BoxUpdater
 
 if TYPE_CHECKING:
@@ -195,12 +196,3 @@ class Blob:
         return Tracks(
             frame.index, frame.t, cast(Plane, plane), "person", id, alone, pos, vel, cov, box, score, seen=seen
         )
-
-
-def image_covariance(state: Array, scale: Array) -> Array:
-    """Returns the covariances (N, 4, 4) of x, y, vx, vy, px and px/s, of filters (5, N, D); scale (N,): px per m."""
-    cov = np.zeros((state.shape[1], 16))  # entry (i, j) at 4 i + j: the strides below walk along diagonals
-    var, cross, rate = state[kalman.VAR :, :, :2] * (scale * scale)[:, None]
-    cov[:, 0:6:5], cov[:, 10:16:5] = var, rate
-    cov[:, 2:8:5] = cov[:, 8:14:5] = cross
-    return cov.reshape(-1, 4, 4)

@@ -26,7 +26,8 @@ class BoxUpdater:
     """Updates the tracks of `people`, a table that must follow `config` already, from the boxes of each frame.
 
     State: people, the table of tracks; scores, the calibration of scores; gate, confirm_gate: largest d^2 (squared
-    Mahalanobis distance) of an association and of a measurement that may confirm a track.
+    Mahalanobis distance) of an association and of a measurement that may confirm a track; fading (5, 1, 4): factors
+    of the filters in each frame.
     """
 
     def __init__(self, config: BlobConfig, people: TrackedPeople) -> None:
@@ -38,6 +39,7 @@ class BoxUpdater:
         from scipy.special import chdtri
 
         self.gate, self.confirm_gate = chdtri(4, 1 - np.array([config.gate, CONFIRM_GATE]))  # eq. 10
+        self.fading = kalman.fading(np.exp(-self.people.dynamics.dt / SIZE_RATE_TIME * np.array([0, 0, 1, 1])))
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
         """Updates the tracks with a frame's detections: predict, associate, update, confirm, delete, start."""
@@ -47,17 +49,18 @@ class BoxUpdater:
             image_scale.required(people.px_per_m)
         people.predict(observed=detections is not None)
         if people.by_existence:
-            kalman.fade_rates(people.bank[:, :, 2:], np.exp(-people.dynamics.dt / SIZE_RATE_TIME))
+            people.bank *= self.fading
         people.widen_view(z)
         d2, log_det = people.innovations(z)
-        evidence, ratio, inside = people.evidence(d2, log_det), self.scores.ratios(score), d2 <= self.gate
-        rows, columns = people.associate(np.where(inside, d2, np.inf), evidence, ratio)
-        terms = kalman.update(people.bank, rows, z[columns], people.noise)
+        rows, columns = np.nonzero(d2 <= self.gate)
+        d2, ratio, free = d2[rows, columns], self.scores.ratios(score), np.ones(len(z), bool)
+        evidence = people.evidence(rows, d2, log_det[rows])
+        best = people.associate(rows, columns, d2, evidence, ratio[columns])
+        free[columns[best] if people.by_existence else columns] = False
+        rows, columns, d2, evidence = rows[best], columns[best], d2[best], evidence[best]
+        kalman.update(people.bank, rows, z[columns], people.noise)
         people.measure_on_ground(rows, z[columns], people.noise)
-        near = np.add.reduce(terms, 1) / np.square(people.scale[rows]) <= self.confirm_gate
-        people.record_measured(rows, near, score[columns], evidence[rows, columns], ratio[columns])
-        free = np.ones(len(z), bool) if people.by_existence else ~inside.any(0)
-        free[columns] = False
+        people.record_measured(rows, d2 <= self.confirm_gate, score[columns], evidence, ratio[columns])
         person = people.new_people(z, free, ratio)
         person[columns] = people.existence()[rows]
         self.scores.add(score, person)
@@ -74,7 +77,7 @@ class BoxUpdater:
         if detections is None or detections.box is None or not len(detections.box):
             return np.zeros((0, 4)), np.zeros(0)
         score = detections.score if len(detections.score) else np.ones(len(detections.box))
-        good = np.flatnonzero((detections.box[:, 2:] > 0).all(1))
+        good = np.flatnonzero((detections.box[:, 2] > 0) & (detections.box[:, 3] > 0))
         # of two boxes on one body the second is the one with the lower score, whatever their order in the file
         order = good[np.lexsort((*detections.box[good].T, -score[good]))]
         return box_geometry.centred_from_ltwh(detections.box[order]), score[order]

@@ -35,6 +35,7 @@ from tracking.papers.blob import person_template_kernels as kernels
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.person_look_kernels import LEARN_SHOWN, LOOK_TIME
 from tracking.papers.blob.track_management import TrackedEllipses
+from tracking.papers.blob.track_management_kernels import covered_shares
 from tracking.running import image_scale
 
 SIZE_TIME = 0.5  # s between pictures from which sizes are learned once enough is remembered: it must be of many people
@@ -150,7 +151,7 @@ class PixelUpdater:
             unexplained = np.concatenate([unexplained, self._person_ellipses(box_geometry.centred(entered))])
         d2, log_det = people.directed_innovations(made.z, made.angle_var)
         each = np.arange(len(made.rows))
-        evidence = people.evidence(d2, log_det)[made.rows, each]
+        evidence = people.evidence(made.rows, d2[made.rows, each], log_det[made.rows, each])
         away = people.update(made.rows, made.z, made.noise, made.angle_var)
         boxes = self._person_boxes(upright(made.z[:, :4], made.z[:, 4]))
         people.measure_on_ground(made.rows, boxes, made.noise)
@@ -159,7 +160,7 @@ class PixelUpdater:
             self._learn_looks(seen.image, made.rows)
         near = away <= self.confirm_gates[kalman.directed(made.angle_var).astype(int)]
         people.record_measured(made.rows, near, made.support, evidence)
-        person = people.new_people(unexplained[:, :4], np.ones(len(unexplained), bool))
+        person = people.new_people(unexplained[:, :4].copy(), np.ones(len(unexplained), bool))
         people.delete_tracks(t)
         people.start_tracks(unexplained, np.ones(len(unexplained)), t, person)
 
@@ -179,7 +180,7 @@ class PixelUpdater:
     def _lone_people(self, found: Blobs, expected: Array) -> Bools:
         one = not self.size.reliable or self.size.one_person(found.box, found.ellipse)
         sure, blobs = expected[self.people.confirmed], box_geometry.centred_from_ltwh(found.box)
-        several = (box_geometry.covered_share(sure, blobs) >= SHARED).sum(0) > 1
+        several = (covered_shares(sure, blobs) >= SHARED).sum(0) > 1
         return np.asarray(one & ~found.cut() & ~several)
 
     def _person_boxes(self, upright: Array) -> Array:
@@ -190,7 +191,10 @@ class PixelUpdater:
 
     def _associate(self, z: Array, angle_var: Array) -> tuple[Measured, Ints, Array]:
         d2, log_det = self.people.directed_innovations(z, self._gated_direction(angle_var))
-        rows, taken = self.people.associate(self._gated(d2, angle_var), self.people.evidence(d2, log_det))
+        rows, taken = np.isfinite(self._gated(d2, angle_var)).nonzero()
+        evidence = self.people.evidence(rows, d2[rows, taken], log_det[rows, taken])
+        best = self.people.associate(rows, taken, d2[rows, taken], evidence)
+        rows, taken = rows[best], taken[best]
         noise = np.tile(self.people.noise, (len(rows), 1))
         return Measured(rows, z[taken], noise, angle_var[taken], np.ones(len(rows))), taken, d2
 

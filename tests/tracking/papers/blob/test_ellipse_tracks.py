@@ -10,6 +10,7 @@ from sim.types import Camera, Context
 from tracking.filters import kalman
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.track_management import TrackedEllipses
+from tracking.papers.blob.track_management_kernels import visible_shares
 
 FPS, SCALE = 10.0, 40.0
 UP, LEVEL = np.pi / 2, 0.0
@@ -48,7 +49,8 @@ def test_looks_stay_with_their_people():
 def test_who_lies_behind_somebody_is_hidden_by_the_boxes_round_the_ellipses(x, wide, share):
     """Of 68 px of his length 28 are behind a wide person beside him, 16 behind a slim one in front."""
     one = people([100, 100, 68, 10, LEVEL], [x, 110, 68, wide, UP])
-    assert one.visible_shares() == pytest.approx([share, 1.0], abs=0.02)
+    shares = visible_shares(one.upright_boxes(), one.scale, one.existence(), one.bank[kalman.VAR])
+    assert shares == pytest.approx([share, 1.0], abs=0.02)
 
 
 def test_who_lies_at_the_edge_leaves_by_his_length():
@@ -65,4 +67,5 @@ def test_from_straight_above_nobody_is_behind_anybody():
     )
     one = TrackedEllipses(settings, settings.dynamics(FPS), Context(FPS, 20.0, camera=camera, image_size=(320, 240)))
     one.start_tracks(np.array([[100.0, 100, 12, 8, UP], [100, 106, 12, 12, UP]]), np.ones(2), 0.0, np.ones(2))
-    assert one.visible_shares().tolist() == [1.0, 1.0]
+    one.predict()
+    assert one.detectable.tolist() == [settings.detect_prob] * 2
