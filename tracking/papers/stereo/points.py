@@ -55,7 +55,7 @@ def sizes(
 ) -> tuple[Array, Array, Array]:
     """Returns height, width and the height that errors alone would give, (M,) each, m, of M foreground regions."""
     found = np.full((3, len(blobs)), np.nan)
-    row, column = np.nonzero((blobs.label > 0) & ~np.isnan(disparity))
+    row, column = np.nonzero(~np.isnan(disparity))
     blob = blobs.label[row, column] - 1
     points = back_project(camera, np.column_stack([column + 0.5, row + 0.5, disparity[row, column]]))
     axes = np.stack([[0.0, 0.0, 1.0], camera.rotation[0]])
@@ -107,7 +107,7 @@ class PicturePoints:
             return SpacePoints.none()
         c, left = self.config, grey(image)
         blobs = self.foreground.person_blobs(seen.mask)
-        disparity = self.stereo.match(left, grey(right), blobs.label > 0)
+        disparity = self.stereo.match(left, grey(right), blobs)
         deviations = (c.pixel_noise, c.pixel_noise, c.disparity_noise)
         people = person_mask(blobs, disparity, self.camera, deviations)
         self.foreground.adapt(seen, people)
