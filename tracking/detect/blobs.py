@@ -51,6 +51,14 @@ class Blobs(Frozen):
     def __len__(self) -> int:
         return len(self.area)
 
+    def window(self, row: int, margin: int = 0) -> tuple[slice, slice]:
+        """Returns the rows and columns of the box of blob `row` (from 0), and of `margin` px round it."""
+        left, top, wide, high = self.box[row].astype(int).tolist()
+        return (
+            slice(max(top - margin, 0), top + high + margin),
+            slice(max(left - margin, 0), left + wide + margin),
+        )
+
     def cut(self) -> Bools:
         """Returns flags (M,): True for each blob whose box touches an edge of the image or is at most 1 px away from
         it."""

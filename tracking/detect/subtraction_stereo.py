@@ -47,14 +47,16 @@ class SubtractionStereo:
         matcher.setTextureThreshold(0)
         matcher.setDisp12MaxDiff(1)
         around = self.block // 2 + 1  # the matcher filters the pictures by a window of 3 px first
-        for k, (x, y, wide, high) in enumerate(blobs.box.astype(int).tolist()):
-            first, top = max(x - around - self.disparities, 0), max(y - around, 0)
-            top -= top % 2  # the filter takes rows in pairs from the top, and leaves out the last one of an odd number
-            part = slice(top, y + high + around), slice(first, x + wide + around)
+        for k in range(len(blobs)):
+            rows, columns = inside = blobs.window(k)
+            below, across = blobs.window(k, around)
+            # the filter takes rows in pairs from the top, and leaves out the last one of an odd number
+            top, first = below.start // 2 * 2, max(across.start - self.disparities, 0)
+            part = slice(top, below.stop), slice(first, across.stop)
             if left[part].shape[0] <= self.block or left[part].shape[1] < self.disparities + self.block:
                 continue  # the edge of the picture cuts all blocks
-            raw = matcher.compute(left[part], right[part])[y - top :, x - first :][:high, :wide]
-            inside = slice(y, y + high), slice(x, x + wide)
+            raw = matcher.compute(left[part], right[part])
+            raw = raw[rows.start - top : rows.stop - top, columns.start - first : columns.stop - first]
             own = (raw > 0) & (blobs.label[inside] == k + 1)
             found[inside][own] = raw[own] / np.float32(MULTIPLE)
         return found
