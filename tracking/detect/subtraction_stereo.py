@@ -1,10 +1,9 @@
 """Subtraction stereo: disparities inside the foreground only (Hoshikawa et al. 2011, sec. 2).
 
 The matcher is OpenCV's block matcher (`cv2.StereoBM`: grey values, sub-pixel by a parabola, uniqueness, left-right
-check). Block matching is local: each foreground region is matched for itself, in the rectangle round it. Costs, the best
-match and its uniqueness are those of the whole picture to the last bit. The left-right check compares the pixels of one
-rectangle with each other. It removes the parts of people that another person of the same region hides from the right
-camera.
+check). Block matching is local: each foreground region is matched for itself, in the rectangle round it. Disparities
+are those of the whole picture to the last bit. The left-right check compares the pixels of one rectangle with each
+other. It removes the parts of people that another person of the same region hides from the right camera.
 
 Ours: the background is subtracted from the left picture only.
 """

@@ -10,7 +10,7 @@ from sim.scene.camera import project_pair
 from tests.sim.scene.test_stereo import rig
 from tracking.detect import blobs
 from tracking.detect.subtraction_stereo import LEAST_UNIQUE, MULTIPLE, SubtractionStereo, sampled
-from tracking.papers.stereo.points import LEAST_HEIGHT, person_mask, sizes
+from tracking.papers.stereo.person_regions import LEAST_HEIGHT, person_mask, sizes
 
 HIGH, WIDE = 120, 200
 
