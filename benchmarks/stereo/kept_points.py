@@ -18,7 +18,7 @@ from tracking.detect.background_training import train
 from tracking.detect.features import SpacePoints
 from tracking.papers.stereo import tracker
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.points import PicturePoints, moved_away, stereo_camera
+from tracking.papers.stereo.picture_points import PicturePoints, moved_away, stereo_camera
 
 # Parameters that change no points, or move finished points.
 TRACKING = frozenset({

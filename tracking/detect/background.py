@@ -30,7 +30,7 @@ import numpy as np
 
 from sim.types import Bools, Image
 from tracking.detect import background_kernels as kernels
-from tracking.detect import background_training
+from tracking.detect import brightness_gain
 from tracking.detect.background_kernels import BACKGROUND as BACKGROUND
 from tracking.detect.background_kernels import DARK as DARK
 from tracking.detect.background_kernels import FOREGROUND as FOREGROUND
@@ -84,7 +84,7 @@ class Background:
         self.s, self.b = (np.where(self.valid, n, np.float32(np.inf)) for n in (trained.s, trained.b))
         self._counts = trained.counts
         self.gain: Floats = np.ones(3, np.float32)
-        self._grid = background_training.grid(*self.valid.shape)
+        self._grid = brightness_gain.grid(*self.valid.shape)
         self._grid_background = self.valid[self._grid]
         self._first_row = 0
         self._grey = bool((sample[..., :1] == sample).all())
@@ -111,9 +111,9 @@ class Background:
             self.gain = self._estimate_gain(image)
         limits = np.array([*self.thresholds, *self.bounds], np.float32)
         classes = np.empty(self.valid.shape, np.uint8)
-        one, two, three = (np.asarray(plane, np.uint8).ravel() for plane in cv2.split(image))
+        flat = (plane.ravel() for plane in colour_planes(image))
         E, V = self.mean.reshape(3, -1), self.var.reshape(3, -1)
-        kernels.classify(one, two, three, E, V, self.s.ravel(), self.b.ravel(), self.gain, limits, classes.reshape(-1))
+        kernels.classify(*flat, E, V, self.s.ravel(), self.b.ravel(), self.gain, limits, classes.reshape(-1))
         self._grid_background = ~fused_foreground(classes[self._grid]) & self.valid[self._grid]
         return classes
 
@@ -135,7 +135,12 @@ class Background:
         time = self.settings.background_time
         fast, slow = (1 - math.exp(-INTERLEAVE / (self.fps * t)) for t in (time, FOREGROUND_SLOWER * time))
         first, self._first_row = self._first_row, (self._first_row + 1) % INTERLEAVE
-        kernels.adapt(image, classes, keep, self.mean, self.var, self.gain, first, INTERLEAVE, fast, slow, FLOOR**2)
+        rows = slice(first, None, INTERLEAVE)
+        still, background = keep[rows], classes[rows] == BACKGROUND
+        kernels.adapt(
+            colour_planes(image[rows]), still, background, self.mean, self.var, self.gain, first, INTERLEAVE, fast,
+            slow, FLOOR**2,
+        )  # fmt: skip
 
     @property
     def noise(self) -> Floats:
@@ -153,10 +158,15 @@ class Background:
     def _estimate_gain(self, image: Image) -> Floats:
         seen = np.moveaxis(image[self._grid], -1, 0).astype(np.float32)
         mean = self.mean[:, *self._grid]
-        found = background_training.gain(seen, mean, self._grid_background)
+        found = brightness_gain.gain(seen, mean, self._grid_background)
         if found is None:
-            found = background_training.gain(seen, mean, self.valid[self._grid])
+            found = brightness_gain.gain(seen, mean, self.valid[self._grid])
         return self.gain if found is None else found
+
+
+def colour_planes(image: Image) -> tuple[Image, ...]:
+    """Returns the three colour planes (H, W) of an image (H, W, 3), contiguous."""
+    return tuple(np.asarray(plane, np.uint8) for plane in cv2.split(image))
 
 
 def fused_foreground(classes: Image) -> Bools:

@@ -70,54 +70,56 @@ def classify(
 
 @njit(cache=True)
 def adapt(
-    image: Image, classes: Image, protected: Bools, E: Floats, V: Floats, g: Floats, first: int, step: int,
+    planes: tuple[Image, ...], still: Bools, background: Bools, E: Floats, V: Floats, g: Floats, first: int, step: int,
     fast: float, slow: float, least: float,
 ) -> None:  # fmt: skip
-    """Change mean E and variance V, (3, H, W) float32, in place towards a frame (H, W, 3) uint8. Returns nothing.
+    """Change mean E and variance V, (3, H, W) float32, in place towards a frame. Returns nothing.
 
-    Only the rows first, first + step, first + 2 step, … change. classes (H, W): the frame's pixel classes. g (3,): the
-    frame's gain (brightness factor) per channel. Pixels where `protected` (H, W) is True stay as they are.
+    Only the rows first, first + step, first + 2 step, … change. Of these R rows are planes, three of (R, W) uint8: the
+    colours; background (R, W): True where the class is BACKGROUND; still (R, W): True where pixels stay as they are. g
+    (3,): the frame's gain (brightness factor) per channel.
 
     E moves towards I / g (I the frame's grey level) by the share `fast` where the class is BACKGROUND, by `slow`
     elsewhere. It stays at 1 or above, as the brightness of a black pixel is undefined. V moves towards the squared
     residual in image grey levels, by `fast`, only where the class is BACKGROUND. It stays at `least` (squared grey
     levels) or above. A channel at 255 is skipped where the model expects 255 or more: a clipped value does not show the
-    true brightness.
+    true brightness. Values are chosen, not branched for, so that the loop vectorises.
     """
     quick, late, floor = np.float32(fast), np.float32(slow), np.float32(least)
-    for r in range(first, image.shape[0], step):
-        for c in range(image.shape[1]):
-            if protected[r, c]:
-                continue
-            background = classes[r, c] == BACKGROUND
-            rate = quick if background else late
-            for k in range(3):
-                value = image[r, c, k]
-                if value == CLIPPED and g[k] * E[k, r, c] >= np.float32(CLIPPED):
-                    continue
-                d = np.float32(value) / g[k] - E[k, r, c]
-                E[k, r, c] = max(E[k, r, c] + rate * d, np.float32(1.0))
-                if background:
-                    V[k, r, c] = max(V[k, r, c] + rate * (d * d * g[k] * g[k] - V[k, r, c]), floor)
+    top, one = np.float32(CLIPPED), np.float32(1.0)
+    for k in range(3):
+        plane, gain = planes[k], g[k]
+        for row in range(len(plane)):
+            value, mean, var = plane[row], E[k, first + row * step], V[k, first + row * step]
+            for c in range(len(value)):
+                e, v, seen = mean[c], var[c], background[row, c]
+                stays = still[row, c] | ((value[c] == CLIPPED) & (gain * e >= top))
+                d = np.float32(value[c]) / gain - e
+                moved = max(e + (quick if seen else late) * d, one)
+                spread = max(v + (quick if seen else late) * (d * d * gain * gain - v), floor)
+                mean[c] = e if stays else moved
+                var[c] = spread if seen & ~stays else v
 
 
 @njit(cache=True)
-def watch(image: Image, gain: Floats, reach: Floats, colour: Floats, sightings: Floats) -> None:
+def watch(planes: tuple[Image, ...], gain: Floats, reach: Floats, colour: Floats, sightings: Floats) -> None:
     """Update, in place, each pixel's mean colour since it last changed, and in how many pictures it has been seen.
 
-    image (H, W, 3) uint8; gain (3,): its brightness per channel. reach (3,): grey levels; a channel farther than this
-    from the mean is a change, and starts both anew. colour (3, H, W): at gain 1; sightings (H, W) float32.
+    planes: three of (H, W) uint8, the colours of a picture; gain (3,): its brightness per channel. reach (3,): grey
+    levels; a channel farther than this from the mean is a change, and starts both anew. colour (3, H, W): at gain 1;
+    sightings (H, W) float32.
     """
-    one, k0, k1, k2 = np.float32(1.0), np.float32(1.0) / gain[0], np.float32(1.0) / gain[1], np.float32(1.0) / gain[2]
-    for r in range(image.shape[0]):
-        for c in range(image.shape[1]):
-            d0 = np.float32(image[r, c, 0]) * k0 - colour[0, r, c]
-            d1 = np.float32(image[r, c, 1]) * k1 - colour[1, r, c]
-            d2 = np.float32(image[r, c, 2]) * k2 - colour[2, r, c]
-            same = abs(d0) <= reach[0] and abs(d1) <= reach[1] and abs(d2) <= reach[2]
-            n = sightings[r, c] + one if same else one
-            sightings[r, c] = n
-            share = one / min(n, MEMORY)  # 1 after a change, so that the mean is then this colour
-            colour[0, r, c] += share * d0
-            colour[1, r, c] += share * d1
-            colour[2, r, c] += share * d2
+    one = np.float32(1.0)
+    factor, share = one / gain, np.empty(sightings.shape[1], np.float32)
+    r0, r1, r2, k0, k1, k2 = reach[0], reach[1], reach[2], factor[0], factor[1], factor[2]
+    for r in range(len(sightings)):
+        i0, i1, i2, seen = planes[0][r], planes[1][r], planes[2][r], sightings[r]
+        m0, m1, m2 = colour[0, r], colour[1, r], colour[2, r]
+        for c in range(len(seen)):
+            d0, d1, d2 = np.float32(i0[c]) * k0 - m0[c], np.float32(i1[c]) * k1 - m1[c], np.float32(i2[c]) * k2 - m2[c]
+            n = seen[c] + one if (abs(d0) <= r0) & (abs(d1) <= r1) & (abs(d2) <= r2) else one
+            seen[c], share[c] = n, one / min(n, MEMORY)  # 1 after a change, so that the mean is then this colour
+        for k in range(3):
+            plane, mean = planes[k][r], colour[k, r]
+            for c in range(len(mean)):
+                mean[c] += share[c] * (np.float32(plane[c]) * factor[k] - mean[c])

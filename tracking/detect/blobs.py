@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from sim.arrays import Frozen
 from sim.types import Array, Bools, Image
+from tracking.detect import blobs_kernels as kernels
 
 Labels = NDArray[np.int32]
 # Windows of the three operations, m. Opening removes narrower parts of the foreground, closing fills narrower gaps.
@@ -49,6 +50,14 @@ class Blobs(Frozen):
 
     def __len__(self) -> int:
         return len(self.area)
+
+    def window(self, row: int, margin: int = 0) -> tuple[slice, slice]:
+        """Returns the rows and columns of the box of blob `row` (from 0), and of `margin` px round it."""
+        left, top, wide, high = self.box[row].astype(int).tolist()
+        return (
+            slice(max(top - margin, 0), top + high + margin),
+            slice(max(left - margin, 0), left + wide + margin),
+        )
 
     def cut(self) -> Bools:
         """Returns flags (M,): True for each blob whose box touches an edge of the image or is at most 1 px away from
@@ -84,25 +93,19 @@ def disc(size: int) -> Image:
 def find(mask: Bools, min_area: float) -> Blobs:
     """Returns the connected regions (8 neighbours) of a foreground mask (H, W) bool that have at least `min_area`
     pixels."""
-    count, every, stats, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8), connectivity=8)
-    pixels = np.flatnonzero(mask)
-    region = every.ravel()[pixels] - 1
-    first = np.unique(region, return_index=True)[1]
-    order = np.lexsort((first, -stats[1:, cv2.CC_STAT_AREA]))  # of equal regions that of the first pixel comes first
-    order = order[stats[1 + order, cv2.CC_STAT_AREA] >= max(min_area, 1.0)]
-    rank = np.full(count - 1, -1)
-    rank[order] = np.arange(len(order))
-    row = rank[region]
-    pixels, row = pixels[row >= 0], row[row >= 0]
+    runs = kernels.find_runs(np.ascontiguousarray(mask))
+    region, count = kernels.connect(runs)
+    box, area, centre, spread = kernels.moments(runs, region, count)
+    order = np.argsort(-area, kind="stable")  # of equal regions that of the first pixel comes first
+    order = order[area[order] >= min_area]
+    number = np.zeros(count, np.int32)
+    number[order] = np.arange(1, len(order) + 1)
     label = np.zeros(mask.shape, np.int32)
-    label.ravel()[pixels] = row + 1
-    n, (v, u) = stats[1 + order, cv2.CC_STAT_AREA].astype(float), np.divmod(pixels, mask.shape[1])
-    centre = np.stack([np.bincount(row, x, len(n)) for x in (u, v)], axis=1) / n[:, None]
-    x, y = u - centre[row, 0], v - centre[row, 1]
-    xx, xy, yy = (np.bincount(row, product, len(n)) / n for product in (x * x, x * y, y * y))
+    kernels.paint(runs, number[region], label)
+    xx, xy, yy = spread[order].T
     cov = np.stack([xx + 1 / 12, xy, xy, yy + 1 / 12], axis=-1).reshape(-1, 2, 2)
-    ellipse, angle_var = ellipses(n, centre + 0.5, cov)
-    return Blobs(stats[1 + order, : cv2.CC_STAT_AREA].astype(float), n, ellipse, angle_var, label)
+    ellipse, angle_var = ellipses(area[order], centre[order] + 0.5, cov)
+    return Blobs(box[order], area[order], ellipse, angle_var, label)
 
 
 def ellipses(n: Array, centre: Array, cov: Array) -> tuple[Array, Array]:

@@ -27,6 +27,7 @@ import numpy as np
 
 from sim.types import Bools, Image
 from tracking.detect import background_kernels, blobs
+from tracking.detect.background import colour_planes
 from tracking.detect.background_kernels import Floats
 
 GHOST_TIME = 1.0  # s: a region that has been still for this time can be a ghost.
@@ -75,17 +76,13 @@ class Ghosts:
         self._frames += 1
         if self._frames % self._every:
             return None
-        background_kernels.watch(image, gain, self.reach, self.colour, self.sightings)
+        background_kernels.watch(colour_planes(image), gain, self.reach, self.colour, self.sightings)
         still = self.sightings >= max(math.ceil(GHOST_TIME / self._step) + 1, LEAST_SIGHTINGS)
         regions = blobs.find(mask & still, least)
         band = max(round(BAND_M * px_per_m), LEAST_BAND)
         found = np.zeros(mask.shape, bool)
-        for k, (left, top, wide, high) in enumerate(regions.box.astype(int)):
-            margin = 2 * band
-            part = (
-                slice(max(top - margin, 0), top + high + margin),
-                slice(max(left - margin, 0), left + wide + margin),
-            )
+        for k in range(len(regions)):
+            part = regions.window(k, 2 * band)
             region = regions.label[part] == k + 1
             if has_left(region, mask[part], model[:, *part], self.colour[:, *part], band):
                 found[part] |= cv2.dilate(region.astype(np.uint8), blobs.disc(2 * band + 1)).astype(bool)

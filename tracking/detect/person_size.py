@@ -1,45 +1,22 @@
 """The size of a person in the image: height and width of a person's box at every foot point (ours).
 
 Three sources:
-- A pinhole camera. The box (`boxes`) of an upright typical person who stands at the foot point.
+- A pinhole camera. The box of an upright typical person (typical_person) who stands at the foot point.
 - A camera straight above. Everybody is the same ellipse, turned with the heading; its axes are used instead of the box.
 - No camera. Learned from lone blobs (blobs that may be one person each): the height is a line h = a + b v over the row
   v of the foot, as in a pinhole without roll; the width is SLIM times the height. The line is the one of many on which
   most heights agree, refined by least squares of relative errors. So blobs of several people or of parts of people are
   outliers. Votes prefer the slope SLOPE, as blobs at one row contain no information about it.
 In all three cases height and width are then multiplied by factors on which most lone blobs agree.
-
-Also here: the person whom trackers expect before they have seen anybody: a prior in metres for any camera (ours).
-
-Its width and depth are the trackers' own belief about real people, not the body that the simulator draws. Its height is
-PERSON_HEIGHT, which defines the scale of an image. A real person with arms is some 0.5 m wide and 0.3 m deep, so that
-the silhouette is some 0.42 m wide in the mean over headings. Stride, bags and wide clothes add to that; `PersonSize`
-learns how much from lone blobs.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from sim.scene.body import PERSON_HEIGHT, person_boxes
+from sim.scene.body import PERSON_HEIGHT
 from sim.types import Array, Bools, Camera, Context
-
-WIDTH = 0.42  # m, of the silhouette seen from the side, mean over headings
-SHOULDERS, DEPTH = 0.459, 0.272  # m, from straight above, where shoulders hide the arms: across and along the heading
-
-
-def boxes(camera: Camera, ground: Array) -> Array:
-    """Returns the boxes (N, 4), left, top, width, height, px, of upright typical people in a pinhole camera's image."""
-    n = len(ground)
-    tall, wide = np.full(n, PERSON_HEIGHT), np.full(n, WIDTH)
-    return person_boxes(camera, np.column_stack([ground, np.zeros(n)]), np.zeros(n), tall, wide, wide)
-
-
-def axes_from_above(camera: Camera) -> Array:
-    """Returns the longer and the shorter axis (2,), px, of a typical person under a camera that looks straight down."""
-    tall, wide, deep = np.array([PERSON_HEIGHT]), np.array([SHOULDERS]), np.array([DEPTH])
-    return np.sort(person_boxes(camera, np.zeros((1, 3)), np.zeros(1), tall, wide, deep)[0, 2:])[::-1]
-
+from tracking.detect.typical_person import axes_from_above, boxes
 
 SLIM = 0.36  # width over height of a walking person's box: the first guess without a camera
 ASPECT_FACTOR = 2.0  # largest factor between a lone blob's width over height and the expected one

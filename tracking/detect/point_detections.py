@@ -56,9 +56,8 @@ def divided(found: Blobs, people: Array, size: PersonSize) -> Array:
 
 
 def _pieces(found: Blobs, row: int, known: Array, count: int, person: Array) -> Array:
-    left, top, width, height = found.box[row].astype(int).tolist()
-    v, u = np.nonzero(found.label[top : top + height, left : left + width] == row + 1)
-    pixels = (np.stack([u + left, v + top], axis=1) + 0.5) / person
+    v, u = np.nonzero(found.label[found.window(row)] == row + 1)
+    pixels = (np.stack([u, v], axis=1) + found.box[row, :2] + 0.5) / person
     centres = np.zeros((0, 2))
     for _ in range(count):
         choice = known / person if len(centres) < len(known) else pixels

@@ -1,9 +1,9 @@
 """Subtraction stereo: disparities inside the foreground only (Hoshikawa et al. 2011, sec. 2).
 
 The matcher is OpenCV's block matcher (`cv2.StereoBM`: grey values, sub-pixel by a parabola, uniqueness, left-right
-check). Block matching is local, so that it works on the part of the pictures round the foreground alone; the
-disparities are those of the whole picture to the last bit. The left-right check removes the parts of people that
-another person hides from the right camera.
+check). Block matching is local: each foreground region is matched for itself, in the rectangle round it. Disparities
+are those of the whole picture to the last bit. The left-right check compares the pixels of one rectangle with each
+other. It removes the parts of people that another person of the same region hides from the right camera.
 
 Ours: the background is subtracted from the left picture only.
 """
@@ -14,7 +14,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.types import Array, Bools, Image
+from sim.types import Array, Image
+from tracking.detect.blobs import Blobs
 
 MULTIPLE = 16  # Numbers of disparities are multiples of it, and steps of a disparity per px, in OpenCV's matcher.
 LEAST_BLOCK = 5  # px: least width of the compared block that OpenCV allows.
@@ -24,7 +25,7 @@ Disparities = NDArray[np.float32]
 
 
 class SubtractionStereo:
-    """Matches a rectified pair at the pixels of the foreground.
+    """Matches a rectified pair at the pixels of foreground blobs.
 
     State: disparities, the number D of disparities that are tried, 0 to D - 1 px, a multiple of 16; block: width of the
     compared block, px, odd.
@@ -35,26 +36,28 @@ class SubtractionStereo:
         self.disparities = MULTIPLE * int(np.ceil((largest + 1) / MULTIPLE))
         self.block = max(block, LEAST_BLOCK)
 
-    def match(self, left: Image, right: Image, mask: Bools) -> Disparities:
-        """Returns the disparities (H, W), px, inside `mask` (H, W), the foreground of the left picture; nan without a
-        match. All are nan if the picture is not wider than `disparities` and `block` together, or not higher than
-        `block`."""
-        found = np.full(mask.shape, np.nan, np.float32)
-        rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
-        reach = self.disparities + self.block  # of a match to the left, and of what it is checked against to the right
-        if not len(rows) or mask.shape[0] <= self.block or mask.shape[1] <= reach:
-            return found
-        part = (
-            slice(max(rows[0] - self.block, 0), rows[-1] + self.block + 1),
-            slice(max(columns[0] - reach, 0), columns[-1] + reach + 1),
-        )
+    def match(self, left: Image, right: Image, blobs: Blobs) -> Disparities:
+        """Returns the disparities (H, W), px, at the pixels of blobs of the left picture; nan elsewhere and without a
+        match. left, right (H, W): grey values."""
+        found = np.full(left.shape, np.nan, np.float32)
         # made anew for each pair, as trackers are copied, and OpenCV's objects cannot be
         matcher = cv2.StereoBM.create(self.disparities, self.block)
         matcher.setUniquenessRatio(LEAST_UNIQUE)
         matcher.setTextureThreshold(0)
         matcher.setDisp12MaxDiff(1)
-        raw = matcher.compute(left[part], right[part])
-        found[part] = np.where((raw > 0) & mask[part], raw / np.float32(MULTIPLE), np.float32(np.nan))
+        around = self.block // 2 + 1  # the matcher filters the pictures by a window of 3 px first
+        for k in range(len(blobs)):
+            rows, columns = inside = blobs.window(k)
+            below, across = blobs.window(k, around)
+            # the filter takes rows in pairs from the top, and leaves out the last one of an odd number
+            top, first = below.start // 2 * 2, max(across.start - self.disparities, 0)
+            part = slice(top, below.stop), slice(first, across.stop)
+            if left[part].shape[0] <= self.block or left[part].shape[1] < self.disparities + self.block:
+                continue  # the edge of the picture cuts all blocks
+            raw = matcher.compute(left[part], right[part])
+            raw = raw[rows.start - top : rows.stop - top, columns.start - first : columns.stop - first]
+            own = (raw > 0) & (blobs.label[inside] == k + 1)
+            found[inside][own] = raw[own] / np.float32(MULTIPLE)
         return found
 
 

@@ -126,7 +126,7 @@ def test_the_kernel_equals_its_twin():
         noise = r.integers(-5, 6, still.shape) + 60 * (r.random((12, 15, 1)) < 0.03)
         image = (still + noise).astype(np.uint8)
         image.setflags(write=False)
-        background_kernels.watch(image, gain, reach, colour, sightings)
+        background_kernels.watch(tuple(np.moveaxis(image, -1, 0).copy()), gain, reach, colour, sightings)
         twin = reference.watch(image, gain, reach, *twin)
         np.testing.assert_allclose(colour, twin[0], rtol=1e-4, err_msg=str(k))
         assert np.array_equal(sightings, twin[1])

@@ -7,7 +7,7 @@ import pytest
 
 from sim.scene.camera import camera_rotation, project
 from sim.types import Camera, Context
-from tracking.detect import person_size
+from tracking.detect import typical_person
 from tracking.detect.person_size import ENOUGH, PersonSize
 
 BARE = Context(10.0, float("nan"), image_size=(480, 360))
@@ -53,7 +53,7 @@ def test_people_wider_or_narrower_than_the_typical_one_are_learned_with_a_camera
     size = PersonSize(Context(10.0, 60.0, camera=seen, image_size=seen.image))
     foot = np.column_stack([r.uniform(60, 420, 60), r.uniform(200, 340, 60)])
     h, expected = size.at(foot).T
-    right = wide / person_size.WIDTH * expected
+    right = wide / typical_person.WIDTH * expected
     w = right * (1 + 0.04 * r.normal(size=60))
     box = np.column_stack([foot[:, 0] - w / 2, foot[:, 1] - h, w, h])
     assert size.one_person(box, ellipses(box)).mean() > 0.9

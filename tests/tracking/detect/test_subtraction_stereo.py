@@ -1,4 +1,4 @@
-"""Matching inside the foreground: the disparities of the whole picture, at less cost; persons by their size."""
+"""Matching inside blobs: the disparities of the whole picture, at less cost; persons by their size."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from sim.scene.camera import project_pair
 from tests.sim.scene.test_stereo import rig
 from tracking.detect import blobs
 from tracking.detect.subtraction_stereo import LEAST_UNIQUE, MULTIPLE, SubtractionStereo, sampled
-from tracking.papers.stereo.points import LEAST_HEIGHT, person_mask, sizes
+from tracking.papers.stereo.person_regions import LEAST_HEIGHT, person_mask, sizes
 
 HIGH, WIDE = 120, 200
 
@@ -38,35 +38,51 @@ def three_regions() -> np.ndarray:
     return mask
 
 
+def found_in(mask: np.ndarray) -> blobs.Blobs:
+    return blobs.find(mask, 1)
+
+
+def whole_match(stereo: SubtractionStereo, left: np.ndarray, right: np.ndarray, most: int) -> np.ndarray:
+    """Disparities of the whole picture; most: largest difference in the left-right check, -1 for no check."""
+    matcher = cv2.StereoBM.create(stereo.disparities, stereo.block)
+    matcher.setUniquenessRatio(LEAST_UNIQUE)
+    matcher.setTextureThreshold(0)
+    matcher.setDisp12MaxDiff(most)
+    raw = matcher.compute(left, right)
+    return np.where(raw > 0, raw.astype(np.float32) / MULTIPLE, np.float32(np.nan))
+
+
 def same(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return (a == b) | (np.isnan(a) & np.isnan(b))
 
 
 @pytest.mark.parametrize("shift", [3.0, 6.4, 11.7])
 def test_it_finds_the_shift_to_a_part_of_a_pixel(shift: float) -> None:
-    found = SubtractionStereo(14.0, 9).match(*pair(shift), three_regions())
+    found = SubtractionStereo(14.0, 9).match(*pair(shift), found_in(three_regions()))
     assert np.isfinite(found[three_regions()]).mean() > 0.95
     assert np.isnan(found[~three_regions()]).all()
     assert np.nanmedian(np.abs(found - shift)) < 0.1
 
 
 @pytest.mark.parametrize(("largest", "block"), [(14.0, 9), (14.0, 5), (40.0, 15), (14.0, 35)])
-def test_inside_the_mask_it_is_bit_equal_to_a_match_of_the_whole_picture(largest: float, block: int) -> None:
-    left, right = pair(5.3)
+@pytest.mark.parametrize("high", [HIGH, HIGH - 1])
+def test_inside_the_mask_it_is_bit_equal_to_a_match_of_the_whole_picture(largest: float, block: int, high: int) -> None:
+    """But for the left-right check, which sees fewer pixels: it may keep what a check of the whole picture removes."""
+    left, right = (image[:high] for image in pair(5.3))
     left[:, 150:] = 90  # without texture
     stereo = SubtractionStereo(largest, block)
-    matcher = cv2.StereoBM.create(stereo.disparities, stereo.block)
-    matcher.setUniquenessRatio(LEAST_UNIQUE)
-    matcher.setTextureThreshold(0)
-    matcher.setDisp12MaxDiff(1)
-    raw = matcher.compute(left, right)
-    dense = np.where(raw > 0, raw.astype(np.float32) / MULTIPLE, np.float32(np.nan))
+    checked, unchecked = (whole_match(stereo, left, right, most) for most in (1, -1))
     specks = np.random.default_rng(0).uniform(size=left.shape) < 0.02
     corner = np.zeros(left.shape, bool)
     corner[-3:, -30:] = True
-    for mask in (three_regions(), specks, corner, np.ones(left.shape, bool)):
-        found = stereo.match(left, right, mask)
-        assert same(found, np.where(mask, dense, np.nan)).all()
+    for mask in (three_regions()[:high], specks, corner, np.ones(left.shape, bool)):
+        found = stereo.match(left, right, found_in(mask))
+        known = np.isfinite(found)
+        assert np.array_equal(found[known], unchecked[known])
+        assert not (known & ~mask).any()
+        assert known[mask & np.isfinite(checked)].all()
+        assert np.count_nonzero(known[mask] & np.isnan(checked[mask])) <= 0.02 * mask.sum()
+    assert same(found, checked).all()  # of a mask that is the whole picture
 
 
 def test_what_another_hides_from_the_right_camera_has_no_disparity() -> None:
@@ -75,7 +91,7 @@ def test_what_another_hides_from_the_right_camera_has_no_disparity() -> None:
     right[:, : 100 - 11] = far[1][:, : 100 - 11]  # the near part covers columns 92 to 100 of the far one
     mask = np.zeros(left.shape, bool)
     mask[20:100, 60:140] = True
-    found = SubtractionStereo(14.0, 9).match(left, right, mask)
+    found = SubtractionStereo(14.0, 9).match(left, right, found_in(mask))
     assert np.nanmedian(found[20:100, 60:85]) == pytest.approx(3.0, abs=0.2)
     assert np.nanmedian(found[20:100, 110:140]) == pytest.approx(11.0, abs=0.2)
     assert np.isfinite(found[30:90, 93:96]).mean() < 0.2
@@ -84,7 +100,7 @@ def test_what_another_hides_from_the_right_camera_has_no_disparity() -> None:
 @pytest.mark.parametrize("size", [(3, 200), (120, 20), (9, 24)])
 def test_pictures_without_room_for_a_block_have_no_disparities(size: tuple[int, int]) -> None:
     left, right = (image[: size[0], : size[1]].copy() for image in pair(5.3))
-    found = SubtractionStereo(14.0, 9).match(left, right, np.ones(size, bool))
+    found = SubtractionStereo(14.0, 9).match(left, right, found_in(np.ones(size, bool)))
     assert np.isfinite(found).sum() <= (1 if size == (9, 24) else 0)
 
 

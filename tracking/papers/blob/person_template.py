@@ -19,9 +19,11 @@ template costs the share `support` of a person's area. No template may have less
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from sim.types import Array, Bools
+from sim.types import Array, Bools, Ints
 from tracking.detect import blobs
 from tracking.detect.person_size import SLIM, SMALLEST, PersonSize
 from tracking.papers.blob import new_people_kernels as new
@@ -69,15 +71,25 @@ def _in_region(foreground: Bools, cover: Cover, guesses: Array, person: float, s
 
 def _guesses(found: blobs.Blobs, row: int, most: int, size: PersonSize) -> Array:
     """Returns first places of 1, 2, … `most` people in a region, who stand in parts of as many pixels each."""
-    left, top, wide, high = found.box[row].astype(int)
-    at = np.argwhere(found.label[top : top + high, left : left + wide] == row + 1)[:, ::-1] + (left, top)
-    centre = at + 0.5
-    along = centre @ np.linalg.eigh(np.cov(at.T))[1][:, -1] if size.above else at[:, 0]
-    order = np.argsort(along, kind="stable")
-    parts = [part for n in range(1, most + 1) for part in np.array_split(order, n)]
+    inside, corner = found.label[found.window(row)] == row + 1, found.box[row, :2].astype(int)
     if size.above:
-        middle = np.array([centre[part].mean(0) for part in parts])
+        at = np.argwhere(inside)[:, ::-1] + corner + 0.5
+        along = at @ np.linalg.eigh(np.cov(at.T - 0.5))[1][:, -1]
+        middle = np.array([part.mean(0) for part in _parts(at[np.argsort(along, kind="stable")], most)])
         extent = size.at(middle)
         return np.column_stack([middle[:, 0], middle[:, 1] + extent[:, 0] / 2, extent])
-    stand = np.array([[at[part, 0].mean() + 0.5, np.quantile(at[part, 1], LOWEST) + 1] for part in parts])
+    at = np.argwhere(inside.T) + corner  # column by column
+    stand = np.array([[part[:, 0].mean() + 0.5, _lowest(part[:, 1]) + 1] for part in _parts(at, most)])
     return np.column_stack([stand, size.at(stand)])
+
+
+def _parts(at: Any, most: int) -> list[Any]:
+    return [part for n in range(1, most + 1) for part in np.array_split(at, n)]
+
+
+def _lowest(rows: Ints) -> float:
+    """Returns numpy's quantile LOWEST of rows (N,), in a tenth of its time."""
+    last = LOWEST * (len(rows) - 1)
+    k = int(last)
+    low, high = np.partition(rows, (k, min(k + 1, len(rows) - 1)))[[k, min(k + 1, len(rows) - 1)]].tolist()
+    return low + (high - low) * (last - k) if last - k < 0.5 else high - (high - low) * (1 - (last - k))

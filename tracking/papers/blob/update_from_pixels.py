@@ -144,7 +144,10 @@ class PixelUpdater:
         made, taken, d2 = self._associate(z, angle_var)
         unexplained = np.delete(z, taken, 0) if split else z[~np.isfinite(self._gated(d2, angle_var)).any(0)]
         if split:
-            cover = np.append(0, kernels.EXPLAINED * lone).astype(np.int16).take(found.label)
+            cover = np.zeros(seen.mask.shape, np.int16)
+            for k in columns.tolist():
+                part = found.window(k)
+                cover[part][found.label[part] == k + 1] = kernels.EXPLAINED
             for confirmed in (True, False):
                 made = made.joined(self._measure_by_templates(seen, cover, expected, made.rows, confirmed))
             entered = person_template.find_new_people(seen.mask, cover, self.size, ENTRY_SUPPORT)
@@ -209,7 +212,9 @@ class PixelUpdater:
         self, seen: Segmented, cover: kernels.Cover, expected: Array, rows: Ints, confirmed: bool
     ) -> Measured:
         people = self.people
-        open_rows = np.setdiff1d(np.flatnonzero(people.confirmed == confirmed), rows)
+        unmeasured = people.confirmed == confirmed
+        unmeasured[rows] = False
+        open_rows = np.flatnonzero(unmeasured)
         at = box_geometry.standing(self._person_boxes(expected[open_rows]))
         size = self.size.at(at[:, :2])
         size = np.where(np.isfinite(size), size, at[:, 2:])

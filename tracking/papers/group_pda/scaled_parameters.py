@@ -15,7 +15,7 @@ from tracking.papers.group_pda.config import GroupPdaConfig
 
 SPEED_PRIOR = 1.3  # m/s: standard deviation of a newborn group's velocity, per axis, that of walking people.
 LEAST_PEOPLE = 0.25  # From pixels: components with less foreground, in people, are noise (ours).
-COLOUR_BINS = 64  # Bins of a group's colour histogram (tracking.papers.group_pda.from_pixels).
+COLOUR_BINS = 64  # Bins of a group's colour histogram (tracking.papers.group_pda.colours).
 
 
 @dataclass(frozen=True)

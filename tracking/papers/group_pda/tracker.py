@@ -131,14 +131,9 @@ from tracking.papers.group_pda.association import (
     with_missed_members,
 )
 from tracking.papers.group_pda.births_and_losses import add_newborns, confirm, expected_members, remove_lost
+from tracking.papers.group_pda.colours import colour_bins, colour_density, update_histograms
 from tracking.papers.group_pda.config import GroupPdaConfig
-from tracking.papers.group_pda.from_pixels import (
-    ForegroundPoints,
-    colour_bins,
-    colour_density,
-    sine_tilt,
-    update_histograms,
-)
+from tracking.papers.group_pda.from_pixels import ForegroundPoints, sine_tilt
 from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.merging_and_splitting import GroupChanges, fall_apart, whole_groups
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters, scale_parameters

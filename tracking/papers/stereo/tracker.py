@@ -105,7 +105,8 @@ from tracking.grouping.whole_groups import GroupIds, WholeGroupEvent, whole_grou
 from tracking.papers.stereo import space_group
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.group_life import born, confirm, merge, remove_lost, sphere_groups, split
-from tracking.papers.stereo.points import PicturePoints, PointLinks
+from tracking.papers.stereo.picture_points import PicturePoints
+from tracking.papers.stereo.point_links import PointLinks
 from tracking.papers.stereo.space_group import POS, VEL, Measurement, SpaceGroup
 from tracking.running.image_scale import required
 

@@ -8,7 +8,7 @@ import pytest
 from sim.types import Context
 from tests.sim.scene.test_stereo import rig
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.points import PicturePoints
+from tracking.papers.stereo.picture_points import PicturePoints
 
 FPS = 10.0
 

@@ -17,7 +17,7 @@ from tracking.detect.features import SpacePoints
 from tracking.papers.stereo import space_group
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.group_life import overlap, pooled, separation, sphere_groups
-from tracking.papers.stereo.points import stereo_camera
+from tracking.papers.stereo.picture_points import stereo_camera
 from tracking.papers.stereo.space_group import VEL, Measurement
 from tracking.papers.stereo.tracker import Stereo
 
