@@ -11,9 +11,9 @@ import json
 import os
 import stat
 import tomllib
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -54,8 +54,7 @@ def _parsed(load: Callable[[str], Any], text: str, file: object, form: str, reme
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     found = dict(pairs)
     if len(found) < len(pairs):
-        twice = next(a for a, b in pairwise(sorted(key for key, _ in pairs)) if a == b)
-        raise ValueError(f"the key {twice!r} twice in an object")
+        raise ValueError(f"the key {Counter(key for key, _ in pairs).most_common(1)[0][0]!r} twice in an object")
     return found
 
 

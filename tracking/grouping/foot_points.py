@@ -18,6 +18,7 @@ from sim.scene.standing import standing_points
 from sim.types import Array, Bools, Camera, GroupEvent, Ints, Scene, Tracks
 from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
 from tracking.grouping.grouped_tracks import (
+    filled,
     groups_in_frames,
     labels_and_events,
     names_groups,
@@ -113,14 +114,8 @@ def completed(
     )
     places = as_measured(feet, ground.camera)
     _, labels, events = labels_and_events(tracks, fps, 1.0, rule, objective=objective, places=places)
-    named, moving = names_groups(tracks), with_velocities(tracks, fps)
-    shapes = groups_in_frames(moving, 1.0, labels, shapes=not objective)
-    return tuple(
-        t.replace(
-            group=label, events=(*t.events, *moved_events(new, t.id, t.pos)), derived=True,
-            groups=(t.groups if named else None) or groups,
-        ) for t, label, new, groups in zip(moving, labels, events, shapes, strict=True)
-    ), ground  # fmt: skip
+    there = [moved_events(new, t.id, t.pos) for t, new in zip(tracks, events, strict=True)]
+    return tuple(filled(with_velocities(tracks, fps), labels, there, objective=objective)), ground
 
 
 def _boxes(tracks: Sequence[Tracks]) -> Array:

@@ -113,14 +113,7 @@ def derive(
     if not given or any(t.unit == "group" for t in given):
         return given
     table, labels, events = labels_and_events(given, fps, px_per_m, rule, objective=objective)
-    named, shapes = names_groups(given), groups_in_frames(given, table.scale, labels, shapes=not objective)
-    nobody = Groups.none()
-    return [
-        t.replace(
-            group=label, events=(*t.events, *new), derived=True,
-            groups=(t.groups if named else None) or (groups if len(t.id) else nobody),
-        ) for t, label, new, groups in zip(given, labels, events, shapes, strict=True)
-    ]  # fmt: skip
+    return filled(given, labels, events, table.scale, objective=objective)
 
 
 def labels_and_events(
@@ -191,6 +184,19 @@ def events_at_end(reported: Sequence[Tracks], filled: Sequence[Tracks], fps: flo
         return 0
     after, last, own = _known_after(fps), filled[-1], len(reported[-1].events)
     return sum(e.kind in after and e.end + after[e.kind] > last.index for e in last.events[own:])
+
+
+def filled(
+    tracks: Sequence[Tracks], labels: Sequence[Ints], events: Sequence[tuple[GroupEvent, ...]], px_per_m: float = 1.0,
+    *, objective: bool = False,
+) -> list[Tracks]:  # fmt: skip
+    """Returns the tracks with these group ids and further events, and with groups that follow from the ids unless the
+    tracker names groups. labels, events: of each `Tracks`. px_per_m, objective: as of `derive`."""
+    named, every = names_groups(tracks), groups_in_frames(tracks, px_per_m, labels, shapes=not objective)
+    return [
+        t.replace(group=own, events=(*t.events, *new), groups=(t.groups if named else None) or groups, derived=True)
+        for t, own, new, groups in zip(tracks, labels, events, every, strict=True)
+    ]
 
 
 def _of_frames(

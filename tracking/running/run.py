@@ -53,15 +53,14 @@ def run_info(
     """
     sample = prepared.context.background
     begins = 1 if sample is None else causal_from(prepared.sequence)
-    diagnostics, stored = prepared.diagnostics("after the last frame"), None
-    if prepared.mode == "file" and prepared.given is not None:
-        stored = detections_hash(prepared.given.detections)
+    diagnostics = prepared.diagnostics("after the last frame")
+    stored = prepared.given if prepared.mode == "file" else None
     return {
         "tracker": prepared.name,
         "config": prepared.config.as_dict() if prepared.config else {},
         "seed": seed,
         "detections": prepared.mode,
-        "detections_hash": stored,
+        "detections_hash": stored and detections_hash(stored.detections),
         "input": prepared.input,
         "sensor": dict(sensor),
         "background": None if sample is None else prepared.sequence.source.get("background", f"{len(sample)} frames"),

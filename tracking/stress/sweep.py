@@ -141,16 +141,13 @@ class Sweep:
         for k, axis in enumerate(plan.axes):
             hard = (*easy[:k], axis.hard, *easy[k + 1 :])
             (other, *_) = sources(plan.scenarios, plan.seeds[:1], plan.settings_at(hard))
-            if plan.detections != "file" and all(key_of(text).startswith("sensor.") for text in axis.settings(0)):
-                raise InputError(
-                    place="--vary", got=axis.name, expected="an axis that changes the scenes",
-                    remedy=f"--detections {plan.detections} does not use [sensor]: leave it out, or vary other keys",
-                )  # fmt: skip
-            if plan.detections != "image" and _content(first) == _content(other):
-                raise InputError(
-                    place="--vary", got=axis.name, expected="an axis that changes the scenes",
-                    remedy=f"{first.name} is the same at both ends; pictures are not drawn for these trackers",
-                )  # fmt: skip
+            unused = plan.detections != "file" and all(key.startswith("sensor.") for key in axis.settings(axis.hard))
+            if unused or (plan.detections != "image" and _content(first) == _content(other)):
+                remedy = f"{first.name} is the same at both ends; pictures are not drawn for these trackers"
+                if unused:
+                    remedy = f"--detections {plan.detections} does not use [sensor]: leave it out, or vary other keys"
+                expected = "an axis that changes the scenes"
+                raise InputError(place="--vary", got=axis.name, expected=expected, remedy=remedy)
 
     def _scenes(self, values: Values) -> tuple[Scene, ...]:
         if (values, self.seeds) not in self._made:

@@ -86,3 +86,18 @@ def test_mapping_equals_the_assignment_of_each_frame(seed: int) -> None:
                 who[j] = first + i
         expected += who.tolist()
     assert mapped_people(pairs).tolist() == expected
+
+
+def test_ties_among_few_pairs_are_broken_as_in_the_whole_table() -> None:
+    """In some of these frames the small table of the pairs that are left has another best matching first."""
+    r = np.random.default_rng(0)
+    given = [np.where(r.random((8, 8)) < 0.35, r.integers(1, 9, (8, 8)) / 8, 0.0) for _ in range(300)]
+    pairs = pairs_of(given)
+    chosen = np.flatnonzero(match_as_table(pairs, pairs.s))
+    expected = [
+        (8 * k + a, 8 * k + b)
+        for k, table in enumerate(given)
+        for a, b in zip(*linear_sum_assignment(-table), strict=True)
+        if table[a, b] > 0
+    ]
+    assert list(zip(pairs.i[chosen].tolist(), pairs.j[chosen].tolist(), strict=True)) == expected
