@@ -1,1 +1,1 @@
-"""Exports stored datasets to formats of other programs: COCO (one JSON file) and WebDataset (tar files)."""
+"""Writes truth, tracks and datasets for other programs: COCO, KITTI, WebDataset, tidy CSV and Parquet tables."""
