@@ -16,9 +16,9 @@ from scenarios.loading.toml_files import KeyPath, Table, did_you_mean, place_of
 TAGS = {"number", "distribution", "point", "meet"}  # of the discriminators of values, in pydantic's locations
 # What is expected, by the type of pydantic's error and its context.
 EXPECTED = {
-    "bool_type": "true or false", "int_type": "an integer", "float_type": "a number", "finite_number": "a finite number",
-    "string_type": "a text", "string_pattern_mismatch": "a name: a letter, then letters, digits, '_', '.' or '-'",
-    "model_type": "a table", "model_attributes_type": "a table", "literal_error": "{expected}",
+    "bool_type": "true or false", "int_type": "an integer", "float_type": "a number", "string_type": "a text",
+    "string_pattern_mismatch": "a name: a letter, then letters, digits, '_', '.' or '-'", "model_type": "a table",
+    "finite_number": "a finite number", "model_attributes_type": "a table", "literal_error": "{expected}",
     "tuple_type": "a list, see docs/reference/scenario-files.md", "value_error": "{error}",
     "too_short": "a length of at least {min_length}", "too_long": "a length of at most {max_length}",
     "greater_than": "greater than {gt:g}", "greater_than_equal": "greater than or equal to {ge:g}",
