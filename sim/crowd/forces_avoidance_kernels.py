@@ -112,8 +112,6 @@ def _avoid_groups(status, push, by_x):  # type: ignore[no-untyped-def]
             wx, wy = status[a, MEAN_VX] - status[b, MEAN_VX], status[a, MEAN_VY] - status[b, MEAN_VY]
             size = status[a, RADIUS] + status[b, RADIUS] + 2.0 * PERSON_RADIUS
             fx, fy = _power_law(dx, dy, wx, wy, size, AVOID_GROUP)
-            if fx == 0.0 and fy == 0.0:
-                continue
             # The smaller group yields more.
             share = 2.0 * status[b, COUNT] / (status[a, COUNT] + status[b, COUNT])
             push[a, 0] += share * fx
