@@ -150,13 +150,10 @@ def _feed(h: Any, value: Any) -> None:
             _sized(h, b"b", value)
         case tuple() | list():
             h.update(f"t{len(value)};".encode())
-            if len(value) > 1 and all(type(item) is np.ndarray and item.dtype == np.float64 for item in value):
-                known = not np.isnan(np.concatenate([item.ravel() for item in value])).any()  # one look for many hulls
-                for item in value:
-                    _array(h, item, known)
-                return
+            floats = len(value) > 1 and all(type(item) is np.ndarray and item.dtype == np.float64 for item in value)
+            known = floats and not np.isnan(np.concatenate([item.ravel() for item in value])).any()  # one look for all
             for item in value:
-                _feed(h, item)
+                _array(h, item, known) if known else _feed(h, item)
         case dict():
             h.update(f"d{len(value)};".encode())
             for key in sorted(value):

@@ -3,10 +3,10 @@
 Forces on a person, in the order in which they are computed:
 
 - towards the goal, the person's place in the group's formation and the group's velocity: `forces_goal_kernels`;
-- sideways with the strides: `sway` there;
+- sideways with the strides: `_sway` there;
 - away from other people, other groups, walls and pillars: `forces_avoidance_kernels`.
 
-`forces_kernels.accelerate` adds them up. A body weighs 1 kg, so a force is an acceleration in m/s². The sum of the
+`forces_goal_kernels.accelerate` adds them up. A body weighs 1 kg, so a force is an acceleration in m/s². The sum of the
 avoidance forces and the goal force is capped at MAX_ACCELERATION. If the whole scene is turned or moved, the
 forces turn or move with it. The order of people changes them by rounding only.
 
@@ -111,7 +111,7 @@ class GroupArrays(NamedTuple):
         )  # fmt: skip
 
     def with_room(self, w: int) -> GroupArrays:
-        """Returns arrays with room for at least w waypoints of each group: these ones, or with longer route and kind."""
+        """Returns arrays with room for at least w waypoints of each group: these, or longer route and kind."""
         if w <= self.kind.shape[1]:
             return self
         room = ((0, 0), (0, w - self.kind.shape[1]))
@@ -128,7 +128,7 @@ class PeopleArrays(NamedTuple):
     # formation, forward and left, m
     noise: Array
     # (N, 5) cosine and sine of the phase of the strides; velocity of the sway x, y, m/s; amplitude of the sway at 1.34
-    # m/s, m. `sway` updates all but the amplitude.
+    # m/s, m. `_sway` updates all but the amplitude.
     gait: Array
     calm: Array  # (N, 4) x, y, vx, vy without the velocity of the sway, m, m/s
     wanted: Array  # (N, 2) wanted velocity without its fluctuation, m/s. The goal kernels overwrite both.
@@ -145,7 +145,7 @@ class PeopleArrays(NamedTuple):
 
 
 class Obstacles(NamedTuple):
-    """What stands still in the scene, m. None in place of what the scene has not, so that its forces are not compiled."""
+    """What stands still in the scene, m. What the scene has not is None, so that its forces are not compiled."""
 
     # (S, 10) rows of `sim.scene.terrain.flight_rows`, and the share of the speed kept on them (0 to 1); None without
     stairs: Array | None

@@ -25,6 +25,8 @@ from sim.crowd.forces import (
 # fmt: on
 # isort: on
 
+WIDER = 4  # row after X … VY
+GROUP_REACH = 64.00000000000001  # m²: the number after that of GROUP_RANGE
 BRUTE = 48  # people, up to which all pairs are tried
 TINY = 1e-9  # m
 QUEUE_SEPARATION_RANGE = 0.5  # m: members of one queue repel each other up to this distance
@@ -65,56 +67,57 @@ def _power_law(dx, dy, wx, wy, radius, strength):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True)
+def _candidates(rows, s, first, last, reach, touch, found, m):  # type: ignore[no-untyped-def]
+    """Appends to found[m:] the discs first … last - 1 that may act on disc s; returns the new length.
+
+    rows (5, M): x, y, vx, vy, and by how much the radius exceeds PERSON_RADIUS. reach, touch: squares of distances, m².
+    """
+    x, y, vx, vy, wider = rows[X], rows[Y], rows[VX], rows[VY], rows[WIDER]
+    for t in range(np.uint64(first), np.uint64(last)):
+        dx, dy = x[s] - x[t], y[s] - y[t]
+        d2 = dx * dx + dy * dy
+        if d2 < reach:
+            wx, wy = vx[s] - vx[t], vy[s] - vy[t]
+            size, cross = wider[s] + wider[t] + 2.0 * PERSON_RADIUS, dx * wy - dy * wx
+            root = (wx * wx + wy * wy) * size * size - cross * cross
+            found[m] = t
+            m += np.uint64((d2 < touch) | ((dx * wx + dy * wy < 0.0) & (root > 1e-12)))
+    return m
+
+
+@njit(cache=True)
 def _avoid_groups(status, push, by_x):  # type: ignore[no-untyped-def]
-    """Overwrites push (G, 2) with each group's acceleration from avoiding other groups as discs, and sorts by_x (G,)."""
+    """Overwrites push (G, 2) with each group's acceleration from avoiding other groups, and sorts by_x (G,)."""
     push[:] = 0.0
     sort_by(status[:, MEAN_X].copy(), by_x)
     live, m = np.empty(len(status), np.int64), 0
     for g in by_x:
         live[m] = g
         m += status[g, AVOIDED] > 0.0
-    rows = np.empty((RADIUS + 1, m))  # columns COUNT … RADIUS of `status` as rows, groups sorted by x
+    rows = np.empty((5, m))  # columns MEAN_X … RADIUS of `status` as rows, groups sorted by x
     for s in range(m):
-        for k in range(RADIUS + 1):
-            rows[k, s] = status[live[s], k]
+        for k in range(5):
+            rows[k, s] = status[live[s], MEAN_X + k]
     found = np.empty(m + 1, np.uint32)
     last = 0
-    for s in range(m):
+    for s in range(np.uint64(m)):
         a = np.uint64(live[s])
-        while last < m and rows[MEAN_X, s] - rows[MEAN_X, last] >= -GROUP_RANGE:
+        while last < m and rows[X, s] - rows[X, last] >= -GROUP_RANGE:
             last += 1
-        for k in range(_near_discs(rows, s, last, found)):
+        for k in range(_candidates(rows, s, s + np.uint64(1), last, GROUP_REACH, 0.0, found, np.uint64(0))):
             b = np.uint64(live[found[k]])
+            if status[a, COUNT] + status[b, COUNT] < 2.5:
+                continue
             dx, dy = status[a, MEAN_X] - status[b, MEAN_X], status[a, MEAN_Y] - status[b, MEAN_Y]
             wx, wy = status[a, MEAN_VX] - status[b, MEAN_VX], status[a, MEAN_VY] - status[b, MEAN_VY]
             size = status[a, RADIUS] + status[b, RADIUS] + 2.0 * PERSON_RADIUS
             fx, fy = _power_law(dx, dy, wx, wy, size, AVOID_GROUP)
-            if fx == 0.0 and fy == 0.0:
-                continue
             # The smaller group yields more.
             share = 2.0 * status[b, COUNT] / (status[a, COUNT] + status[b, COUNT])
             push[a, 0] += share * fx
             push[a, 1] += share * fy
             push[b, 0] -= (2.0 - share) * fx
             push[b, 1] -= (2.0 - share) * fy
-
-
-@njit(cache=True)
-def _near_discs(rows, s, last, found):  # type: ignore[no-untyped-def]
-    """Writes to `found` the groups s + 1 … last - 1 on collision course with group s; returns how many."""
-    count, x, y = rows[COUNT], rows[MEAN_X], rows[MEAN_Y]
-    vx, vy, disc = rows[MEAN_VX], rows[MEAN_VY], rows[RADIUS]
-    s, m = np.uint64(s), np.uint64(0)
-    for t in range(s + np.uint64(1), np.uint64(last)):
-        dx, dy = x[s] - x[t], y[s] - y[t]
-        if dx * dx + dy * dy <= GROUP_RANGE * GROUP_RANGE and count[s] + count[t] >= 2.5:
-            wx, wy = vx[s] - vx[t], vy[s] - vy[t]
-            size = disc[s] + disc[t] + 2.0 * PERSON_RADIUS
-            cross = dx * wy - dy * wx
-            root = (wx * wx + wy * wy) * size * size - cross * cross
-            found[m] = t
-            m += np.uint64((dx * wx + dy * wy < 0.0) & (root > 1e-12))
-    return m
 
 
 @njit(cache=True)
@@ -174,30 +177,12 @@ def _cells(state, reach):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _candidates(rows, s, first, last, reach, touch, radius, found, m):  # type: ignore[no-untyped-def]
-    """Appends to found[m:] the people first … last - 1 that may act on person s; returns the new length."""
-    x, y, vx, vy = rows[X], rows[Y], rows[VX], rows[VY]
-    for t in range(np.uint64(first), np.uint64(last)):
-        dx, dy = x[s] - x[t], y[s] - y[t]
-        d2 = dx * dx + dy * dy
-        if d2 < reach:
-            wx, wy = vx[s] - vx[t], vy[s] - vy[t]
-            cross = dx * wy - dy * wx
-            root = (wx * wx + wy * wy) * radius * radius - cross * cross
-            found[m] = t
-            m += np.uint64((d2 < touch) | ((dx * wx + dy * wy < 0.0) & (root > 1e-12)))
-    return m
-
-
-@njit(cache=True)
 def _pairs(state, tag, out):  # type: ignore[no-untyped-def]
     """Adds the forces between people closer than PERSON_RANGE to out (N, 2), each pair once."""
     n = len(state)
     order, start, nx = _cells(state, PERSON_RANGE)
-    reach, radius = PERSON_RANGE * PERSON_RANGE, 2.0 * PERSON_RADIUS
-    touch = max(SEPARATION_RANGE, QUEUE_SEPARATION_RANGE, radius)
-    touch *= touch
-    rows = np.empty((4, n))
+    reach, touch = PERSON_RANGE * PERSON_RANGE, max(SEPARATION_RANGE, QUEUE_SEPARATION_RANGE, 2.0 * PERSON_RADIUS) ** 2
+    rows = np.zeros((5, n))
     for s in range(n):
         for k in range(4):
             rows[k, s] = state[order[s], k]
@@ -207,10 +192,10 @@ def _pairs(state, tag, out):  # type: ignore[no-untyped-def]
         above = c + nx < len(start) - 1
         for s in range(np.uint64(start[c]), np.uint64(start[c + 1])):
             next_one, m = s + np.uint64(1), np.uint64(0)
-            m = _candidates(rows, s, next_one, start[c + 1 + right], reach, touch, radius, found, m)
+            m = _candidates(rows, s, next_one, start[c + 1 + right], reach, touch, found, m)
             if above:
                 first, last = start[c + nx - left], start[c + nx + right + 1]
-                m = _candidates(rows, s, first, last, reach, touch, radius, found, m)
+                m = _candidates(rows, s, first, last, reach, touch, found, m)
             i = np.uint64(order[s])
             for k in range(m):
                 j = np.uint64(order[found[k]])

@@ -1,6 +1,7 @@
-"""Forces towards goals, and the sway of strides, as numba kernels: ways of groups, formations, doors, queues, stairs.
+"""All forces on people as one kernel, `accelerate`, and its parts towards goals: ways of groups, formations, doors,
+queues, stairs, and the sway of strides. A call from Python takes time for each array, so there is one call.
 
-`drive` and `sway` are the entries; sim.crowd.forces names all columns, slots and units.
+`sim.crowd.forces` names all columns, slots and units.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from sim.crowd.forces import (
 )
 # fmt: on
 # isort: on
+from sim.crowd.forces_avoidance_kernels import avoid
 from sim.elementary_kernels import atan2, cos, sin
 from sim.scene.terrain import AXIS_X, AXIS_Y, FOOT_X, FOOT_Y, HALF_WIDTH, LENGTH
 
@@ -31,7 +33,7 @@ PI = 3.141592653589793
 
 
 @njit(cache=True)
-def sway(wanted, gait, dt, out):  # type: ignore[no-untyped-def]
+def _sway(wanted, gait, dt, out):  # type: ignore[no-untyped-def]
     """Adds the acceleration by the sway of the strides to out (N, 2), and advances gait (N, 5) by dt (s).
 
     The sway is A(v) sin(phase) to the left of the wanted velocity (N, 2) of size v. The phase grows by 2 pi STRIDES
@@ -263,15 +265,15 @@ def _mark_avoided(kind, current, status):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def drive(  # type: ignore[no-untyped-def]
+def accelerate(  # type: ignore[no-untyped-def]
     state, place, target, pace, noise, gait, calm, wanted, tag,
-    route, kind, length, current, speed, heading, finish, arrived, status,
-    stairs, dt, out,
+    route, kind, length, current, speed, heading, finish, arrived, status, push, by_x,
+    stairs, walls, pillars, dt, out,
 ):  # fmt: skip
-    """Overwrites out (N, 2) with the accelerations towards goals, and advances the groups' ways by dt (s).
+    """Overwrites out (N, 2) with the accelerations of all people, m/s², and advances ways and strides by dt (s).
 
-    Returns False, with nothing written, if a state is not below 1e9. state (N, 4), stairs (S, 10), None without stairs:
-    columns as in `forces`. The others are the fields of PeopleArrays and GroupArrays.
+    state (N, 4): columns as in `forces`. The others are the fields of PeopleArrays, GroupArrays and Obstacles. Returns
+    False, with nothing written, if a state is not below 1e9.
     """
     for i in range(len(state)):
         if not abs(state[i, X]) + abs(state[i, Y]) + abs(state[i, VX]) + abs(state[i, VY]) < 1e9:
@@ -288,4 +290,6 @@ def drive(  # type: ignore[no-untyped-def]
         route, kind, length, current, speed, heading, status, stairs, out,
     )  # fmt: skip
     _mark_avoided(kind, current, status)
+    _sway(wanted, gait, dt, out)
+    avoid(calm, tag, status, push, by_x, walls, pillars, out)
     return True

@@ -23,7 +23,7 @@ from scenarios.errors import WorkError
 from scenarios.schema.scenario import Scenario
 from sim.clock import PHYSICS_RATE, SCRIPT_RATE, STEPS, FrameTimes
 from sim.crowd.arrival import NEAR_GOAL, STAND_TIME, has_way, obstacle, stands
-from sim.crowd.forces import AMPLITUDE, COS, SIN, WAYPOINT, GroupArrays, Obstacles, PeopleArrays
+from sim.crowd.forces import AMPLITUDE, COS, SIN, WAYPOINT, Obstacles, PeopleArrays
 from sim.crowd.group_state import GroupState
 from sim.crowd.heading import facings, headings
 from sim.crowd.navigation import Navigator, blocked, scene_of
@@ -154,7 +154,7 @@ class World:
             self.between[0] = self.states
         if n == 0:
             return
-        from sim.crowd.forces_kernels import accelerate
+        from sim.crowd.forces_goal_kernels import accelerate
 
         noise.take(self.columns, axis=0, out=self.people.noise, mode="clip")
         given = self.state, *self.people, *self.groups.arrays, *self.obstacles, STEP_TIME, self.force[:n]

@@ -48,7 +48,7 @@ class PixelGeometry:
 
     depth: Floats  # (H, W) float32: m along the optical axis; inf for sky
     kind: NDArray[np.uint8]  # (H, W) uint8: NOTHING (sky), GROUND, WALL, PILLAR, TREAD or RISER of `sim.scene.raycast`
-    place: Floats  # (H, W, 3) float32: x, y, z in m in the world; 1e9 for sky
+    place: Floats  # (3, H, W) float32: x, y, z in m in the world; 1e9 for sky
 
 
 @dataclass(frozen=True)
@@ -143,14 +143,9 @@ class CameraView:
         from sim.render.empty_scene_kernels import trace_pixels
 
         size = self.height, self.width
-        depth, kind, place = np.empty(size, np.float32), np.empty(size, np.uint8), np.empty((*size, 3), np.float32)
+        depth, kind, place = np.empty(size, np.float32), np.empty(size, np.uint8), np.empty((3, *size), np.float32)
         trace_pixels(self.rays, self.solids, depth, kind, place)
         return PixelGeometry(depth, kind, place)
-
-    @cached_property
-    def places(self) -> Floats:
-        """The places of `geometry` as planes of x, y and z, (3, H, W) m."""
-        return np.ascontiguousarray(np.moveaxis(self.geometry.place, 2, 0))
 
     @cached_property
     def empty_scene(self) -> EmptyScene:

@@ -105,7 +105,7 @@ def _sunlit(point, normal, sun, penumbra, solids, spare, hit):  # type: ignore[n
 
 @njit(cache=True)
 def trace_pixels(rays, solids, depth, kind, place):  # type: ignore[no-untyped-def]
-    """Sets depth (H, W), kind (H, W) and place (H, W, 3) to what the centre of each pixel shows.
+    """Sets depth (H, W), kind (H, W) and place (3, H, W) to what the centre of each pixel shows.
 
     Sky has depth inf and place 1e9.
     """
@@ -116,7 +116,7 @@ def trace_pixels(rays, solids, depth, kind, place):  # type: ignore[no-untyped-d
             t = look(rays, u + 0.5, v + 0.5, solids, o, d, hit)
             depth[v, u], kind[v, u] = t, int(hit[HIT_KIND])
             for k in range(3):
-                place[v, u, k] = o[k] + t * d[k] if t < 1e9 else 1e9
+                place[k, v, u] = o[k] + t * d[k] if t < 1e9 else 1e9
 
 
 @njit(cache=True)

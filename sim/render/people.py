@@ -3,12 +3,9 @@
 For a camera it computes: its rays in the axes of each ellipsoid, the outlines in the image (ellipses in px), nearest
 depths in m, and the range of rows and columns of the pixels that each person can cover. Clothes are colours and
 patterns, painted on one texture page (uint8, BGR) for the body and one for the head; each person draws from random
-streams of their own, so one person more changes nobody else's clothes.
-
-Shadows of people, whose bodies and heads are ellipsoids, in the light of the sun.
-
-Computes where each person's shadow falls in an image (outlines, ranges of pixels, softness of the edge), and whether
-solid things such as walls hide the sun from a person's feet, waist and head.
+streams of their own, so one person more changes nobody else's clothes. In the light of the sun it computes where each
+person's shadow falls in the image (outlines, ranges of pixels, softness of the edge), and whether solid things such as
+walls hide the sun from feet, waist and head.
 """
 
 from __future__ import annotations

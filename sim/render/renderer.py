@@ -210,7 +210,7 @@ class Renderer:
         light = self.illumination
         if view not in self._shadows:
             self._shadows[view] = people_shadows(self.motion, self._bodies, view.camera, light, view.level)
-        place, direct, shadows = view.places, view.empty_scene.direct, self._shadows[view]
+        place, direct, shadows = view.geometry.place, view.empty_scene.direct, self._shadows[view]
         draw_shadows(rows, place, direct, view.level, seen.centre, shadows, light.sun, canvas, self._margin)
 
     def _moved_canvas(self, view: CameraView, index: int) -> FrameCanvas:

@@ -1,5 +1,5 @@
-"""Stairs as ground: the height z = h(x, y), m, which is 0 except on stairs and the landings behind them, and the rows of
-numbers by which kernels know the stairs."""
+"""Stairs as ground: the height z = h(x, y), m, which is 0 except on stairs and the landings behind them, and the rows
+of numbers by which kernels know the stairs."""
 
 from __future__ import annotations
 

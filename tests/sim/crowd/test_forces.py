@@ -20,7 +20,7 @@ from sim.crowd.forces import (
     PeopleArrays,
 )
 from sim.crowd.forces_avoidance_kernels import _avoid_groups, _pairs, _walls
-from sim.crowd.forces_kernels import accelerate
+from sim.crowd.forces_goal_kernels import accelerate
 from tests.reference_steering import between_groups, between_people, from_things
 
 NO_STAIRS, NO_PILLARS = np.zeros((0, 10)), np.zeros((0, 3))

@@ -87,7 +87,7 @@ def test_what_moves_changes_no_truth_and_no_person() -> None:
 def test_clouds_pass_over_the_ground(view: str) -> None:
     light = Light(shadow=0.0, cloud=0.15, cloud_size=5.0)
     made, clear = (Renderer(motion_in(0), VIEWS[view], one, CALM) for one in (light, DARK))
-    place = made.left_view.geometry.place[..., :2].astype(float)
+    place = np.moveaxis(made.left_view.geometry.place[:2], 0, -1).astype(float)
     plain = clear.frame(1).astype(float).sum(axis=2)
     near = (np.abs(place - [8, 5]) < [8, 5]).all(axis=2)
     for index in (1, 12):
