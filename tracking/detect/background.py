@@ -111,9 +111,9 @@ class Background:
             self.gain = self._estimate_gain(image)
         limits = np.array([*self.thresholds, *self.bounds], np.float32)
         classes = np.empty(self.valid.shape, np.uint8)
-        flat = (plane.ravel() for plane in colour_planes(image))
+        one, two, three = (plane.ravel() for plane in colour_planes(image))
         E, V = self.mean.reshape(3, -1), self.var.reshape(3, -1)
-        kernels.classify(*flat, E, V, self.s.ravel(), self.b.ravel(), self.gain, limits, classes.reshape(-1))
+        kernels.classify(one, two, three, E, V, self.s.ravel(), self.b.ravel(), self.gain, limits, classes.reshape(-1))
         self._grid_background = ~fused_foreground(classes[self._grid]) & self.valid[self._grid]
         return classes
 

@@ -94,11 +94,11 @@ def find(mask: Bools, min_area: float) -> Blobs:
     """Returns the connected regions (8 neighbours) of a foreground mask (H, W) bool that have at least `min_area`
     pixels."""
     runs = kernels.find_runs(np.ascontiguousarray(mask))
-    region, count = kernels.connect(runs)
-    box, area, centre, spread = kernels.moments(runs, region, count)
+    first, region = np.unique(kernels.connect(runs), return_inverse=True)
+    box, area, centre, spread = kernels.moments(runs, region, len(first))
     order = np.argsort(-area, kind="stable")  # of equal regions that of the first pixel comes first
     order = order[area[order] >= min_area]
-    number = np.zeros(count, np.int32)
+    number = np.zeros(len(first), np.int32)
     number[order] = np.arange(1, len(order) + 1)
     label = np.zeros(mask.shape, np.int32)
     kernels.paint(runs, number[region], label)

@@ -44,9 +44,8 @@ def find_runs(mask: Bools) -> Runs:
 
 
 @njit(cache=True)
-def connect(runs: Runs) -> tuple[Ints, int]:
-    """Returns the region of each run (R,), and the number of regions. Runs whose pixels are 8 neighbours are in one
-    region; regions are numbered by their first pixels."""
+def connect(runs: Runs) -> Ints:
+    """Returns the first run (R,) of each run's region. Runs whose pixels are 8 neighbours are in one region."""
     region = np.arange(len(runs))
     above = 0
     for k in range(len(runs)):
@@ -58,14 +57,9 @@ def connect(runs: Runs) -> tuple[Ints, int]:
             a, b = find_root(region, k), find_root(region, other)
             region[max(a, b)] = min(a, b)
             other += 1
-    count = 0
     for k in range(len(runs)):
-        if region[k] == k:
-            region[k] = count
-            count += 1
-        else:
-            region[k] = region[region[k]]
-    return region, count
+        region[k] = region[region[k]]
+    return region
 
 
 @njit(cache=True)

@@ -90,6 +90,7 @@ def _parts(at: Any, most: int) -> list[Any]:
 def _lowest(rows: Ints) -> float:
     """Returns numpy's quantile LOWEST of rows (N,), in a tenth of its time."""
     last = LOWEST * (len(rows) - 1)
-    k = int(last)
-    low, high = np.partition(rows, (k, min(k + 1, len(rows) - 1)))[[k, min(k + 1, len(rows) - 1)]].tolist()
-    return low + (high - low) * (last - k) if last - k < 0.5 else high - (high - low) * (1 - (last - k))
+    ends = int(last), min(int(last) + 1, len(rows) - 1)
+    low, high = np.partition(rows, ends)[list(ends)].tolist()
+    part = last - ends[0]
+    return float(low + (high - low) * part if part < 0.5 else high - (high - low) * (1 - part))
