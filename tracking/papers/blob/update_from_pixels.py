@@ -141,8 +141,8 @@ class PixelUpdater:
         lone = self._lone_people(found, expected) if split else np.ones(len(found), bool)
         columns = lone.nonzero()[0]
         z, angle_var = found.ellipse[columns], found.angle_var[columns] + ANGLE_NOISE
-        made, taken, d2 = self._associate(z, angle_var)
-        unexplained = np.delete(z, taken, 0) if split else z[~np.isfinite(self._gated(d2, angle_var)).any(0)]
+        made, taken, gated = self._associate(z, angle_var)
+        unexplained = np.delete(z, taken if split else gated, 0)
         if split:
             cover = np.zeros(seen.mask.shape, np.int16)
             for k in columns.tolist():
@@ -192,21 +192,16 @@ class PixelUpdater:
     def _person_ellipses(self, box: Array) -> Array:
         return box_geometry.inscribed_ellipses(np.concatenate([box[:, :2], box[:, 2:] / self.size.box_over_ellipse], 1))
 
-    def _associate(self, z: Array, angle_var: Array) -> tuple[Measured, Ints, Array]:
-        d2, log_det = self.people.directed_innovations(z, self._gated_direction(angle_var))
-        rows, taken = np.isfinite(self._gated(d2, angle_var)).nonzero()
-        evidence = self.people.evidence(rows, d2[rows, taken], log_det[rows, taken])
-        best = self.people.associate(rows, taken, d2[rows, taken], evidence)
-        rows, taken = rows[best], taken[best]
+    def _associate(self, z: Array, angle_var: Array) -> tuple[Measured, Ints, Ints]:
+        """Returns the measurements by ellipses z (M, 5), the rows of z associated, and those in any gate."""
+        gated_var = np.full(len(z), np.inf) if self.size.above else angle_var
+        d2, log_det = self.people.directed_innovations(z, gated_var)
+        rows, gated = np.nonzero(d2 <= self.gates[kalman.directed(gated_var).astype(int)])
+        d2, log_det = d2[rows, gated], log_det[rows, gated]
+        best = self.people.associate(rows, gated, d2, self.people.evidence(rows, d2, log_det))
+        rows, taken = rows[best], gated[best]
         noise = np.tile(self.people.noise, (len(rows), 1))
-        return Measured(rows, z[taken], noise, angle_var[taken], np.ones(len(rows))), taken, d2
-
-    def _gated_direction(self, angle_var: Array) -> Array:
-        return np.full(len(angle_var), np.inf) if self.size.above else angle_var
-
-    def _gated(self, d2: Array, angle_var: Array) -> Array:
-        directed = kalman.directed(self._gated_direction(angle_var)).astype(int)
-        return np.where(d2 <= self.gates[directed], d2, np.inf)
+        return Measured(rows, z[taken], noise, angle_var[taken], np.ones(len(rows))), taken, gated
 
     def _measure_by_templates(
         self, seen: Segmented, cover: kernels.Cover, expected: Array, rows: Ints, confirmed: bool
