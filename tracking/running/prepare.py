@@ -20,11 +20,10 @@ import numpy as np
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.limits import INTEGER, JSON_BYTES
 from scenarios.reading import parse_json
-from sim.types import Context, DetectionMode, Frame, Ints, Sequence, Tracker, Tracks
+from sim.types import Context, DetectionMode, Detections, Frame, Ints, Sequence, Tracker, Tracks
 from tracking.config import Config
 from tracking.running import image_scale, tracker_registry
 from tracking.running.detection_mode import (
-    Given,
     InputKind,
     as_frames,
     as_needed,
@@ -57,7 +56,7 @@ class PreparedTracker:
     sequence: Sequence
     # with detections and without pictures; None: the sequence's own frames (mode "image")
     frames_given: tuple[Frame, ...] | None
-    given: Given | None = None  # the detections before the tracker's needs chose from them; None as frames_given
+    given: InputFrames | None = None  # as `frames_given`, and what these were chosen from
     scale_frames: int = 0  # as of ImageScale
     history: ReportHistory = field(default_factory=ReportHistory)  # what the tracker has reported since `reset`
     planes: PlaneCheck = field(default_factory=PlaneCheck)  # the same, compared with its input
@@ -137,11 +136,12 @@ class PreparedTracker:
 @dataclass(frozen=True, eq=False)
 class InputFrames:
     """What a tracker gets of a sequence in one mode: the frames (None in the mode "image"), by frame the owners of the
-    detections (None if unknown), and the image scale."""
+    detections (None if unknown), the image scale, and the detections before the tracker's needs chose from them."""
 
     frames: tuple[Frame, ...] | None
     owners: SequenceOf[Ints] | None
     scale: ImageScale
+    detections: SequenceOf[Detections | None] = ()
 
 
 def input_frames(
@@ -153,7 +153,7 @@ def input_frames(
     given = given_detections(mode, sequence, sensor, seed, owned=owned)
     seen = as_needed(given, needs, mode, sequence)
     scale = image_scale.of_sequence(sequence, given)
-    return InputFrames(as_frames(seen.detections, sequence.fps), seen.owners, scale)
+    return InputFrames(as_frames(seen.detections, sequence.fps), seen.owners, scale, given.detections)
 
 
 def prepare(

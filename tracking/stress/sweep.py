@@ -141,7 +141,7 @@ class Sweep:
         for k, axis in enumerate(plan.axes):
             hard = (*easy[:k], axis.hard, *easy[k + 1 :])
             (other, *_) = sources(plan.scenarios, plan.seeds[:1], plan.settings_at(hard))
-            unused = plan.detections != "file" and all(key.startswith("sensor.") for key in axis.settings(axis.hard))
+            unused = plan.detections != "file" and all(s.key.startswith("sensor.") for s in axis.settings(axis.hard))
             if unused or (plan.detections != "image" and _content(first) == _content(other)):
                 remedy = f"{first.name} is the same at both ends; pictures are not drawn for these trackers"
                 if unused:

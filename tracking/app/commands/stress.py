@@ -81,7 +81,7 @@ def _plan(options: StressOptions, detections: DetectionMode) -> Plan:
 
 
 def _refuse_varied(settings: Iterable[str], axes: Iterable[Axis]) -> None:
-    names = {key_of(text): axis.name for axis in axes for text in axis.settings(axis.easy)}
+    names = {setting.key: axis.name for axis in axes for setting in axis.settings(axis.easy)}
     for key in names.keys() & set(map(key_of, settings)):
         got, remedy = "what --vary varies", f"leave it out, and give the ends: --vary {names[key]}=EASY:HARD"
         raise InputError(place=f"--set {key}", got=got, expected="other keys", remedy=remedy)
