@@ -181,8 +181,8 @@ def _pairs(state, tag, out):  # type: ignore[no-untyped-def]
     """Adds the forces between people closer than PERSON_RANGE to out (N, 2), each pair once."""
     n = len(state)
     order, start, nx = _cells(state, PERSON_RANGE)
-    reach, touch = PERSON_RANGE * PERSON_RANGE, max(SEPARATION_RANGE, QUEUE_SEPARATION_RANGE, 2.0 * PERSON_RADIUS) ** 2
-    rows = np.zeros((5, n))
+    touch = max(SEPARATION_RANGE, QUEUE_SEPARATION_RANGE, 2.0 * PERSON_RADIUS)
+    reach, touch, rows = PERSON_RANGE * PERSON_RANGE, touch * touch, np.zeros((5, n))
     for s in range(n):
         for k in range(4):
             rows[k, s] = state[order[s], k]
