@@ -92,8 +92,9 @@ def any_within(place: Array, points: Array, reach: float) -> Bools:
 
 
 @njit(cache=True)
-def displacement(before: Array, after: Array, reach: float) -> Array:
-    """Returns the mean displacement (2,) of the places before (K, 2) that are after (M, 2), too: 0 if none is.
+def displacement(before: Array, after: Array, reach: float) -> tuple[Array, Bools]:
+    """Returns the mean displacement (2,) of the places before (K, 2) that are after (M, 2), too: 0 if none is; and
+    whether there was a place before within reach of each of those after, (M,).
 
     A place is there, too, if it and one after are each other's nearest, at most `reach` apart; all in one unit.
     """
@@ -114,7 +115,7 @@ def displacement(before: Array, after: Array, reach: float) -> Array:
             total[0] += after[j, 0] - before[i, 0]
             total[1] += after[j, 1] - before[i, 1]
             count += 1
-    return total / max(count, 1)
+    return total / max(count, 1), least <= reach * reach
 
 
 @njit(cache=True)

@@ -300,11 +300,12 @@ class GroupPda:
         d2 = gated_distances(bank, points, region, scaled)
         claims = with_missed_members(claimed(points, weights, d2, t), bank, scaled, t)
         expected = expected_members(bank, scaled, t)
-        ratio = np.zeros(claims.d2.shape)
-        if self.config.corrections and (claims.claimants > 1).any():
-            ratio += log_ratio(place_density(bank, claims.points, scaled, t), claims)
+        ratio, shared = np.zeros(claims.d2.shape), np.flatnonzero(claims.claimants > 1)
+        may = np.isfinite(claims.d2[:, shared])
+        if self.config.corrections:
+            ratio[:, shared] += log_ratio(place_density(bank, claims.points[shared], may, scaled, t), may)
         if scaled.colour_bins:
-            ratio += self.config.appearance * log_ratio(colour_density(bank, self.colours), claims)
+            ratio[:, shared] += self.config.appearance * log_ratio(colour_density(bank, self.colours[shared]), may)
         mine = associate(bank, claims, region, ratio, scaled, t)
         remember(bank, claims, mine, predicted, scaled, t)
         if scaled.colour_bins:
