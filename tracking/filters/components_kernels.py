@@ -21,7 +21,7 @@ from math import sqrt
 
 import numpy as np
 
-from sim.compiler import njit, shared_njit
+from sim.compiler import njit
 from sim.elementary_kernels import find_root, sort_by
 from sim.types import Array, Bools, Ints
 
@@ -148,7 +148,7 @@ def unset(count: int) -> Ints:
     return out
 
 
-@shared_njit(cache=True)
+@njit(cache=True)
 def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
     """Returns the first component that each of K is joined with, (K,) (G_x, sec. 3.1)."""
     k = len(sums)
@@ -317,7 +317,7 @@ def _join(parent: Ints, sums: Array, a: int, b: int, left: Ints) -> None:
     left[0] -= 1
 
 
-@shared_njit(cache=True)
+@njit(cache=True)
 def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]:
     """Returns the component of each point (M,), numbered by first points, and the moments (K, 6) of the components."""
     m = len(points)

@@ -198,12 +198,16 @@ def _estimate(
     x: Array, P: Array, extent: Array, size: Array, rest: bool, rules: Array,
 ) -> int:  # fmt: skip
     people, mean, cov = running_moments(points, weights, x[0], x[1], start)
-    seen = np.cumsum(np.append(0.0, fresh))[start:]  # people measured in this frame
-    S = np.empty((len(people), 3))
+    S, seen, evidence = np.empty((len(people), 3)), np.empty(len(people)), np.empty(len(people))
+    measured = shown = 0.0  # people measured in this frame; of the shared points, what colours and places tell
+    for k in range(len(points) + 1):
+        if k >= start:
+            seen[k - start], evidence[k - start] = measured, shown
+        if k < len(points):
+            measured += fresh[k]
+            shown += colour[k] if k >= start else 0.0
     log_mass = np.full(len(people), -np.inf)
     unit = weights.sum() / len(weights)  # people that one point stands for: makes m_N a mass of numbers of points
-    evidence = np.zeros(len(colour) - start + 1)
-    evidence[1:] = np.cumsum(colour[start:])
     width = rules[COUNT_SD] ** 2 + (COUNT_SHARE * size[0]) ** 2  # sigma_n^2
     for j in range(len(people)):
         if feasible[j] and people[j] > 0:
