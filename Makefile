@@ -9,10 +9,12 @@ PIP := $(BIN)/python -m pip install -q --disable-pip-version-check --no-compile 
 RUNTIME := $(VENV)/made-to-run
 ENVIRONMENT := $(VENV)/made-from-constraints
 DOCS := $(VENV)/made-for-docs
+MUTANTS := $(VENV)/made-for-mutants
 DEMO ?=
+DRAWN ?=
 TESTS ?=
 
-.PHONY: demo test test-slow lint types docs clean
+.PHONY: demo test test-slow lint types docs mutants clean
 
 demo: $(RUNTIME)
 	$(BIN)/flockscope demo $(DEMO)
@@ -34,6 +36,9 @@ docs: $(DOCS)
 	$(BIN)/sphinx-build -q -W --keep-going -E -b html -d build/doctrees docs build/docs
 	@echo "build/docs/index.html"
 
+mutants: $(MUTANTS)
+	$(BIN)/python -m benchmarks mutants $(DRAWN)
+
 clean:
 	rm -rf $(VENV) build dist *.egg-info .mypy_cache .ruff_cache .hypothesis flockscope-demo
 	find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +
@@ -54,4 +59,8 @@ $(ENVIRONMENT): $(RUNTIME)
 
 $(DOCS): $(ENVIRONMENT)
 	$(PIP) --no-build-isolation -e ".[docs]"
+	@touch $@
+
+$(MUTANTS): $(ENVIRONMENT)
+	$(PIP) --no-build-isolation -e ".[mutants]"
 	@touch $@

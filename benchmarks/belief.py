@@ -38,7 +38,6 @@ from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA, add_data, add
 from benchmarks.support.replaced_code import replaced_code
 from benchmarks.support.tables import difference_cell, head, interval, mean_cell, number, row, signed, table
 from scenarios.loading.resolve import resolve
-from sim.io.source import open_source
 from sim.types import Array, Bools, Ints, Truth
 from tracking.fitting.belief import BINS, belief_scores, fit_belief, reliability, sample_of
 from tracking.fitting.grouping_scenes import DETECTED, MISSED, pair_scenes, simulated
@@ -49,6 +48,7 @@ from tracking.grouping.grouping_choice import FoundGroups, Grouping, belief_grou
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
 from tracking.grouping.pair_evidence import NAMES, NEAR, QUANTITIES, TIMES
+from tracking.recordings.source import open_source
 from tracking.scoring.evaluation import evaluate
 from tracking.stats import block_intervals
 

@@ -32,8 +32,8 @@ from benchmarks.support.options import add_seeds, new_parser, seeds_text
 from benchmarks.support.tables import head, row
 from benchmarks.support.timing import machine_load
 from sim.dataset.generate import generate
-from sim.io.export.webdataset import webdataset
-from sim.io.source import open_source
+from tracking.export.webdataset import webdataset
+from tracking.recordings.source import open_source
 
 MUST, AIM = 1.7, 1.9  # times the speed of one worker
 GROWTH = 1.1  # times the memory

@@ -25,13 +25,13 @@ from benchmarks.support.tables import table
 from scenarios.loading.resolve import load
 from scenarios.schema.sensor import Sensor
 from sim.detector.draws import false_scores, true_scores
-from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Truth
 from sim.types import Sequence as Recording
 from tracking.fitting.detection_matching import MatchedRecording, match_detections, match_sequence
 from tracking.fitting.error_statistics import error_statistics, simulated_detections
 from tracking.fitting.sensor import fit_matched
+from tracking.recordings.source import open_source
 
 RECORDINGS = (PETS, CAMPUS)
 SCENES = ("merge", "street")

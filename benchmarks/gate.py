@@ -33,7 +33,7 @@ import numpy as np
 from benchmarks.support.options import new_parser
 from benchmarks.support.tables import head, row, share
 from sim.dataset.generate import generate
-from sim.io.files.tables import json_document, plain
+from sim.store.tables import json_document, plain
 from sim.types import Array
 from tracking.app.command_options import CompareOptions, ScoreOptions, TrackOptions
 from tracking.app.command_result import CommandResult

@@ -27,12 +27,12 @@ from benchmarks.support.replaced_code import replaced_code
 from benchmarks.support.tables import difference_cell, head, row
 from scenarios import load
 from sim import simulate
-from sim.io.pictures.background_sample import parse_choice
-from sim.io.source import open_source
+from sim.pictures.background_sample import parse_choice
 from sim.types import Array, Bools, Frame, Sequence
 from tracking.detect import foreground as pipeline_module
 from tracking.detect.background import Background
 from tracking.detect.foreground import Foreground, Segmented
+from tracking.recordings.source import open_source
 from tracking.running.run import track
 
 FPS, SECONDS = 7, 30

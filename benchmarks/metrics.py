@@ -30,9 +30,9 @@ import numpy as np
 from benchmarks.support.options import add_data, new_parser
 from benchmarks.support.tables import head, row
 from benchmarks.support.timing import best_in_turn
-from sim.io.formats.mot_table import read_table
-from sim.io.source import open_source
-from sim.io.store.track_files import read_checked_tracks
+from tracking.recordings.mot_table import read_table
+from tracking.recordings.source import open_source
+from tracking.recordings.track_texts import read_checked_tracks
 from tracking.scoring import evaluate, pooled
 from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.evaluation import weighted_people

@@ -35,10 +35,10 @@ from benchmarks.support.options import (
 from benchmarks.support.tables import head, number, row
 from scenarios.loading.resolve import Entry, names, resolve, suite_names
 from sim.crowd.world import run
-from sim.io.source import open_source
 from sim.sequence import observe
 from sim.types import Sequence as Recording
 from tracking.oracle import oracle
+from tracking.recordings.source import open_source
 from tracking.running.run import track
 from tracking.scoring.evaluation import Scorer
 from tracking.scoring.people_comparison import Similarity

@@ -29,8 +29,8 @@ from scenarios.loading.resolve import load, names
 from scenarios.schema.scenario import ObservationSpec, Scenario
 from sim.crowd.world import run
 from sim.dataset.replay import on_ground, replay
-from sim.io.source import open_source
 from sim.types import Array, Bools, Ints, Motion, Sequence, Truth
+from tracking.recordings.source import open_source
 
 STEP = 0.4  # s
 WALKING = 0.3  # m/s

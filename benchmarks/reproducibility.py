@@ -45,7 +45,7 @@ from benchmarks.support.generate_runs import (
 from benchmarks.support.options import new_parser, seed_range
 from benchmarks.support.tables import head, row
 from sim.dataset.generate import generate
-from sim.io.store.validate import validate
+from sim.store.validate import validate
 from tests.loopback import loopback
 
 ENTRIES = {

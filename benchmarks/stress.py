@@ -41,7 +41,8 @@ from scenarios.schema.scenario import Scenario
 from sim.render.weather import brightness
 from sim.sequence import simulate
 from sim.types import Array, Sequence, Tracks, Truth
-from tracking.environment.episode_cache import Source
+from tracking.episodes.episode_cache import Source
+from tracking.episodes.tuned_tracker import TunedTracker
 from tracking.oracle import oracle
 from tracking.running.tracker_registry import find
 from tracking.scoring.evaluation import Scorer
@@ -52,7 +53,6 @@ from tracking.stress.reductions import difficulties
 from tracking.stress.scene_player import OracleTask, Outcome, Store, Tasks
 from tracking.stress.sweep import Plan, Sweep
 from tracking.stress.worst_scenes import SearchedScene, search, worst
-from tracking.tuning.tuned_tracker import TunedTracker
 
 TRUE_SEEDS = range(28_000, 28_040)
 FINE = 9

@@ -24,9 +24,9 @@ from sim.sequence import simulate
 from sim.workers.pool import WorkerOptions
 from tracking.app.command_options import ScoreOptions, TrackOptions
 from tracking.app.commands.score import score
-from tracking.app.commands.score_ranking import rank_words, shown_columns
-from tracking.app.commands.score_tables import number
 from tracking.app.commands.track import track
+from tracking.app.score_ranking import rank_words, shown_columns
+from tracking.app.score_tables import number
 from tracking.running import run as runs
 from tracking.running import tracker_registry
 from tracking.scoring.evaluation import evaluate

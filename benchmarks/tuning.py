@@ -24,13 +24,13 @@ from benchmarks.support.options import PETS, TOWN_CENTRE, add_data, new_parser
 from benchmarks.support.tables import interval, number, signed, table
 from scenarios import sensor_settings
 from scenarios.loading.resolve import dump_sensor
-from sim.io.source import open_source
 from sim.types import Array, Context, Detections, Frame, Sequence, Tracks
 from tracking.config import Config, param
 from tracking.fitting.detection_matching import match_sequence
 from tracking.fitting.sensor import fit_matched
 from tracking.papers.blob.tracker import Blob
 from tracking.ranking import presence_in
+from tracking.recordings.source import open_source
 from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scorer

@@ -67,6 +67,10 @@ def shared_data() -> Path:
     return root
 
 
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption("--write-guides", action="store_true", help="write what commands print into the guides")
+
+
 def pytest_collection_finish() -> None:
     """Looking through all modules and tests again and again for garbage took a tenth of the time."""
     gc.freeze()

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from sim.io.files import tables
-from sim.io.store.seal import NAMES, sealed_run
+from sim.store import tables
+from sim.store.seal import NAMES, sealed_run
 
 
 def seal_again(folder: Path, **changes: Any) -> None:

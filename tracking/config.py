@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Literal, Self, cast
 from scenarios.errors import InputError
 from scenarios.limits import is_number
 from scenarios.loading.toml_files import did_you_mean, parse, toml_value
-from sim.io.files.numeric_text import read_number
+from sim.store.numeric_text import read_number
 from tracking.running.user_code import tracker_failed, user_code
 
 Scale = Literal["linear", "log", "int", "categorical", "vector"]

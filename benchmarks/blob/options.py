@@ -28,10 +28,10 @@ from benchmarks.peers import synthetic
 from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE
 from benchmarks.support.replaced_code import Replacement, replaced_code
 from benchmarks.support.tables import difference_cell, head, row
-from sim.io.source import open_source
 from tracking.filters import existence
 from tracking.papers.blob import track_management, update_from_boxes
 from tracking.papers.blob.track_management import TrackedPeople
+from tracking.recordings.source import open_source
 
 DOUBLED = 0.1
 RECORDINGS = (TOWN_CENTRE, PETS, CAMPUS)

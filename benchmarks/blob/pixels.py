@@ -27,13 +27,13 @@ from benchmarks.support.in_memory import people_in_view, truth_in_view
 from benchmarks.support.replaced_code import replaced_code
 from benchmarks.support.tables import head, row
 from scenarios.loading.resolve import load
-from sim.io.pictures.background_sample import BackgroundChoice, with_copies
-from sim.io.source import open_source
+from sim.pictures.background_sample import BackgroundChoice, with_copies
 from sim.sequence import simulate
 from sim.types import Frame, Image
 from sim.types import Sequence as Recording
 from tracking.papers.blob import person_look_kernels
 from tracking.papers.blob.config import BlobConfig
+from tracking.recordings.source import open_source
 from tracking.running.run import track
 
 KEYS = "HOTA", "DetA", "AssA", "MOTA", "IDF1"

@@ -16,9 +16,9 @@ import numpy as np
 from benchmarks.joint.runs import Row, Variant, difference, mean_row, measured, pooled, sequences
 from benchmarks.support import tables
 from benchmarks.support.options import HOTEL, seeds_text
-from sim.io.source import open_source
 from sim.types import Sequence as Recording
 from tracking.papers.joint.config import JointConfig
+from tracking.recordings.source import open_source
 
 # Table 2 of the paper, on its own 28 sequences.
 PAPER = {

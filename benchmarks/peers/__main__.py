@@ -38,13 +38,13 @@ from benchmarks.support.tables import head, number, row, signed
 from scenarios import load
 from scenarios.loading.resolve import resolve
 from sim.geometry.boxes import box_iou
-from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Frame, Tracks
 from sim.types import Sequence as Recording
 from tracking.config import Config
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.tracker import Blob
+from tracking.recordings.source import open_source
 from tracking.running.run import track
 from tracking.scoring import evaluate
 from tracking.stats import mean_interval

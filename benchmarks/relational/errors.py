@@ -11,12 +11,12 @@ import numpy as np
 from benchmarks.support import chart, tables
 from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA
 from scenarios.loading.resolve import resolve
-from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Array, Bools, Context, Detections, Frame, Plane, Sequence, Tracks, Truth
 from tracking.filters.assignment import optimal
 from tracking.fitting.relational import LABELS
 from tracking.papers.relational.config import ParticleConfig
+from tracking.recordings.source import open_source
 from tracking.running.prepare import prepare
 from tracking.running.tracker_registry import find
 from tracking.stats import mean_interval

@@ -24,11 +24,11 @@ from scenarios.schema.scenario import ObservationSpec
 from sim.clock import check_stride
 from sim.dataset.replay import WHOLE, Cut, replay_name, resolve_replay
 from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
-from sim.io.files.atomic import PARTIAL, lock_folder, remove_partials, write_file
-from sim.io.files.own_files import is_side_file, output_path, output_paths
-from sim.io.store import sequence_folder
-from sim.io.store.group_files import read_never_arrives
-from sim.io.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest, reject_runs
+from sim.store import sequence_folder
+from sim.store.atomic import PARTIAL, lock_folder, remove_partials, write_file
+from sim.store.group_files import read_never_arrives
+from sim.store.own_files import is_side_file, output_path, output_paths
+from sim.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest, reject_runs
 from sim.streams import check_streams
 from sim.types import Camera, Sequence
 from sim.workers.pool import WorkerOptions, start_workers
@@ -294,13 +294,13 @@ def _summary(errors: dict[str, FlockscopeError], total: int) -> FlockscopeError:
 
 def store_replays(
     sources: Iterable[Sequence], view: ObservationSpec, seeds: range, out: str | Path, *, cut: Cut = WHOLE,
-    calibration: Camera | str | Path | None = None, streams: Iterable[str] = ("left",), images: str = "jpg",
+    calibration: Camera | None = None, streams: Iterable[str] = ("left",), images: str = "jpg",
     progress: Progress | None = None,
 ) -> list[Path]:  # fmt: skip
     """Stores a replay of every source with every seed in folders named as by `generate`; returns the folders.
 
     view: camera, sensor, light and picture, with the frame rate. cut: the part of each recording to replay.
-    calibration: camera, or its file, of recordings that have boxes but no ground positions; None if not needed; an
+    calibration: camera of recordings that have boxes but no ground positions; None if not needed; an
     error for others. streams, images, progress: as for `generate`.
 
     The first error is raised and ends the work; replays stored before it are kept. Recordings of real motion need seeds

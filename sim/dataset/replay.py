@@ -30,8 +30,8 @@ from scenarios.schema.scenario import ObservationSpec
 from scenarios.schema.values import Model, NonNegative, Positive
 from sim.crowd.heading import facings, headings
 from sim.dataset.splits import is_real
+from sim.geometry.boxes import centres
 from sim.hashing import canonical_hash
-from sim.io.formats.labelled_truth import centres
 from sim.rng import draw, rng
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.sequence import observe
@@ -204,19 +204,19 @@ WHOLE = Cut()
 
 
 def replay(
-    source: str | Path | Sequence, camera: str | Path | ObservationSpec | None = None, seed: int = 20_000, *,
-    cut: Cut = WHOLE, calibration: Camera | str | Path | None = None, streams: Iterable[str] = ("left",),
+    source: Sequence, camera: str | Path | ObservationSpec | None = None, seed: int = 20_000, *,
+    cut: Cut = WHOLE, calibration: Camera | None = None, streams: Iterable[str] = ("left",),
 ) -> Sequence:  # fmt: skip
     """Returns the labelled people of a recording as a simulated sequence: real motion, seen by our camera and sensor.
 
     The ground is moved so that the least x and y of people are 1 m. A simulated source keeps its ground and scene.
 
     Args:
-        source: A sequence with truth, or the path of one.
+        source: A sequence with truth (`tracking.recordings.source.open_source` opens recordings).
         camera: Camera, sensor, light and picture, or their TOML file.
         seed: For bodies, looks and sensor.
         cut: The part to replay.
-        calibration: Camera, or its file, of a recording with boxes alone: maps the boxes' feet to the ground.
+        calibration: Camera of a recording with boxes alone: maps the boxes' feet to the ground.
         streams: Pictures: some of "left", "right", "disparity", "ids", "background".
 
     Returns:
@@ -226,21 +226,13 @@ def replay(
         InputError: The source has no labelled people or no way to the ground, the cut is outside it, or people leave
             the camera's view.
     """
-    from sim.io.source import open_source
-
-    if not isinstance(source, Sequence):
-        found = open_source(source, images=False)
-        if len(found) != 1:
-            remedy = "give the path of one of them"
-            raise InputError(file=source, got=f"{len(found)} sequences", expected="one", remedy=remedy)
-        source = found[0]
     view = camera if isinstance(camera, ObservationSpec) else load_observation(camera)
     return resolve_replay(source, view, seed, cut=cut, calibration=calibration, streams=streams)[0]
 
 
 def resolve_replay(
     source: Sequence, view: ObservationSpec, seed: int, *, cut: Cut = WHOLE,
-    calibration: Camera | str | Path | None = None, streams: Iterable[str] = (),
+    calibration: Camera | None = None, streams: Iterable[str] = (),
 ) -> tuple[Sequence, ReplaySpec]:  # fmt: skip
     """Returns the sequence that `replay` returns, and the ReplaySpec that describes it.
 
@@ -248,7 +240,7 @@ def resolve_replay(
     `replay`.
     """
     truth = _labels(source)
-    places = on_ground(truth, source, _calibrated(calibration, source))
+    places = on_ground(truth, source, calibration)
     moving = _moving(places, truth, source, view.camera.fps, cut)
     # A simulated scene stays where it is; recordings may have any origin.
     low, whole = np.nanmin(moving.pos, axis=(0, 1)), source.scene if not is_real(source) else None
@@ -293,22 +285,15 @@ def on_ground(truth: Truth, source: Sequence, calibration: Camera | None = None)
     assert truth.box is not None, "labels have positions or boxes"
     camera = calibration or source.camera
     if camera is not None:
-        from sim.scene.camera import foot_points
+        from sim.scene.camera import foot_points, scaled_to_image
+
+        camera = scaled_to_image(camera, source.image_size, str(source.source.get("path", "")))
 
         return foot_points(truth.box, np.zeros(len(truth.box)), camera)
     if source.source.get("kind") in FLAT:
         return np.asarray(centres(truth.box) * (1, -1) / truth.px_per_m)
     remedy = "give its calibration with --calibration FILE; without one it cannot be replayed"
     raise _wrong(source, "", "labels in the image alone", "places on the ground", remedy)
-
-
-def _calibrated(calibration: Camera | str | Path | None, source: Sequence) -> Camera | None:
-    from sim.io.formats.calibration import read_calibration, scaled_to_image
-
-    if calibration is None or isinstance(calibration, Camera):
-        return calibration
-    path = Path(str(source.source.get("path", "")))
-    return scaled_to_image(read_calibration(Path(calibration)), source.image_size, path)
 
 
 def _moving(places: Array, truth: Truth, source: Sequence, fps: float, cut: Cut) -> Trajectories:

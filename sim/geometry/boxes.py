@@ -1,4 +1,4 @@
-"""Overlaps of boxes: left, top, width, height in px."""
+"""Middles and overlaps of boxes: left, top, width, height in px."""
 
 from __future__ import annotations
 
@@ -21,3 +21,8 @@ def box_intersections(a: Array, b: Array) -> Array:
     low = np.maximum(a[..., :2], b[..., :2])
     high = np.minimum(a[..., :2] + a[..., 2:], b[..., :2] + b[..., 2:])
     return np.asarray(np.prod(np.maximum(high - low, 0.0), axis=-1))
+
+
+def centres(box: Array) -> Array:
+    """Returns the middles (R, 2) of boxes (R, 4) left, top, width, height."""
+    return np.asarray(box[:, :2] + box[:, 2:] / 2)

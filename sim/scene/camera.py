@@ -26,6 +26,8 @@ first 100 boxes is within 11 % of that of all boxes, on CAVIAR's mwt1gt within 1
 from __future__ import annotations
 
 from collections.abc import Iterator
+from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 
@@ -37,6 +39,7 @@ from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Camera, Ints, Scene
 
 CLIMB = 8  # Steps in which the height of the ground that is seen at an image point is found.
+SHAPE_TOLERANCE = 0.01  # relative difference allowed between the aspect ratios of calibration and recording
 
 
 def undistort(x: Array, k: float) -> Array:
@@ -335,3 +338,25 @@ def point_covariances(camera: Camera, xyz: Array, variances: Array) -> Array:
     """Returns the covariances J⁻¹ R J⁻ᵀ (N, 3, 3) m² of measured points xyz (N, 3); variances (3,) px²: of u, v, d."""
     inverse = inverse_3x3(pair_jacobian(camera, xyz))
     return product(inverse * variances, np.swapaxes(inverse, 1, 2))
+
+
+def scaled_to_image(
+    camera: Camera, image: tuple[int, int] | None, path: str | Path, aspect: Fraction = Fraction(1)
+) -> Camera:
+    """Returns the camera scaled to pictures of `image` (width, height) px; unchanged for None or the same size.
+
+    aspect: width / height of a stored pixel. Raises InputError if the pictures have another shape than the calibration.
+    """
+    if image is None or image == camera.image:
+        return camera
+    x, y = image[0] / camera.image[0], image[1] / camera.image[1]
+    # It may be calibrated with the stored pixels or with square ones.
+    if all(abs(x / y / ratio - 1) > SHAPE_TOLERANCE for ratio in (1.0, float(aspect))):
+        got, expected = "a calibration for {}×{} px".format(*camera.image), "one for {}×{} px, or of that shape"
+        raise InputError(
+            file=path, place="--camera", got=got, expected=expected.format(*image),
+            remedy="give this recording's calibration",
+        )  # fmt: skip
+    (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
+    scale = float(camera.px_per_m * np.sqrt(x * y))
+    return camera.replace(image=image, focal_px=(fx * x, fy * y), centre_px=(cx * x, cy * y), px_per_m=scale)

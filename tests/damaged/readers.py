@@ -11,17 +11,17 @@ import numpy as np
 from scenarios import load, sensor_settings
 from scenarios.loading.checks import most_people
 from scenarios.loading.resolve import dump, load_observation, resolve
-from sim.io.formats.calibration import read_calibration
-from sim.io.source import open_source
-from sim.io.store.camera_files import read_scene
-from sim.io.store.group_files import read_events, read_groups_csv, read_near, read_script
-from sim.io.store.track_files import read_tracks
-from sim.io.store.truth_files import read_detections, read_truth
 from sim.scene.camera import ground_jacobian, px_per_m_at_centre, to_ground
 from sim.sequence import simulate
+from sim.store.camera_files import read_scene
+from sim.store.group_files import read_events, read_groups_csv, read_near, read_script
+from sim.store.truth_files import read_detections, read_truth
 from tests.damaged.specimens import study_plan
 from tracking.app.stored_tracks import find_tracks
 from tracking.papers.blob.config import BlobConfig
+from tracking.recordings.calibration import read_calibration
+from tracking.recordings.source import open_source
+from tracking.recordings.track_texts import read_tracks
 from tracking.tuning.study import open_study
 
 # Frames of a recording that are read.

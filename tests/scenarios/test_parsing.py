@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from scenarios.errors import InputError, printable
 from scenarios.loading.toml_files import parse, parse_setting, parse_value
-from sim.io.files.tables import read_json
+from sim.store.tables import read_json
 from tracking.papers.blob.config import BlobConfig
 
 TOML = {

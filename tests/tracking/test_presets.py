@@ -14,10 +14,10 @@ import pytest
 
 from scenarios.loading.resolve import load
 from scenarios.loading.toml_files import names as scenario_names
-from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import DetectionMode, Sequence
 from tracking.config import presets
+from tracking.recordings.source import open_source
 from tracking.running.prepare import prepare
 from tracking.running.tracker_registry import find, names
 

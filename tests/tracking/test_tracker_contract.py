@@ -18,10 +18,10 @@ import pytest
 
 from scenarios.loading.resolve import load
 from scenarios.loading.toml_files import names as scenario_names
-from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import DetectionMode, Frame, Sequence, Tracks, Truth
 from tracking.grouping.grouped_tracks import with_groups
+from tracking.recordings.source import open_source
 from tracking.running.prepare import PreparedTracker, prepare
 from tracking.running.run import track
 from tracking.running.tracker_registry import find, names

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from scenarios.loading.resolve import load
-from sim.io.store.track_files import read_tracks, write_tracks
 from sim.sequence import simulate
+from sim.store.track_files import write_tracks
 from sim.types import Sequence, Tracks
 from tests.fake_tracker import Nearest
 from tracking.grouping.grouped_tracks import with_velocities
+from tracking.recordings.track_texts import read_tracks
 from tracking.running.run import grouped, track
 from tracking.scoring import evaluate
 

@@ -31,7 +31,7 @@ class CommandResult:
 def print_result(result: CommandResult, as_json: bool) -> int:
     """Prints the result of a command on stdout and returns its exit code."""
     if as_json:
-        from sim.io.files.tables import plain
+        from sim.store.tables import plain
 
         _print_json({"status": STATUS[result.code], **plain(result.data)})
     else:
@@ -65,7 +65,7 @@ def as_flockscope_error(error: BaseException) -> FlockscopeError:
     if not isinstance(error, OSError):
         remedy = f"this is a bug: {DEBUG}=1 shows where"
         return WorkError(got=f"{type(error).__name__}: {error}", expected="no exception", remedy=remedy)
-    from sim.io.files.atomic import DISK_FULL
+    from sim.store.atomic import DISK_FULL
 
     reason = error.strerror or type(error).__name__
     file = "" if error.filename is None else error.filename

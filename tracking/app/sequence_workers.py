@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from scenarios.errors import FlockscopeError, WorkError
-from sim.io.source import open_source
 from sim.types import Sequence
 from tracking.app.progress import ProgressMeter
+from tracking.recordings.source import open_source
 
 J = TypeVar("J")
 R = TypeVar("R")

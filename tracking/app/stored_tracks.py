@@ -12,12 +12,8 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError, shortened
-from sim.io.files.own_files import is_hidden, output_paths
-from sim.io.formats.mot_table import size_doubt
-from sim.io.formats.mot_text import frame_rate
-from sim.io.formats.options import BoxScale, refuse_options
-from sim.io.source import holds_sequences
-from sim.io.store.seal import (
+from sim.store.own_files import is_hidden, output_paths
+from sim.store.seal import (
     AGAIN,
     RUN,
     WHOLE,
@@ -30,8 +26,12 @@ from sim.io.store.seal import (
     run_folder,
     tracked_hash,
 )  # fmt: skip
-from sim.io.store.track_files import read_checked_tracks
 from sim.types import Sequence
+from tracking.recordings.mot_table import size_doubt
+from tracking.recordings.mot_text import frame_rate
+from tracking.recordings.options import BoxScale, refuse_options
+from tracking.recordings.source import holds_sequences
+from tracking.recordings.track_texts import read_checked_tracks
 from tracking.running.run import TrackingRun
 
 DEPTH = 3  # Tracks are looked for in this many levels of folders below the path.

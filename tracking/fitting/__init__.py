@@ -1,1 +1,1 @@
-"""Fits a detector's profile, the `[sensor]` table, to labelled recordings (`flockscope fit sensor`)."""
+"""Fits tables to data: a detector's profile, the belief of belonging, events of `joint`, speeds of `relational`."""

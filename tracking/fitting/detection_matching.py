@@ -18,8 +18,8 @@ from scenarios.errors import InputError
 from scenarios.schema.sensor import BoxNoise
 from sim.detector.box_noise import box_errors, perturb_boxes
 from sim.geometry.boxes import box_iou
-from sim.io.store.truth_files import scores_or_ones
 from sim.scene.visibility import image_size_of_boxes, with_visibility
+from sim.store.truth_files import scores_or_ones
 from sim.types import Array, Bools, Camera, Detections, Ints, Sequence, Truth, Unscored
 from tracking.scoring.annotated_frames import annotated_frames
 from tracking.scoring.candidate_pairs import compare, same_frame

@@ -16,8 +16,8 @@ from scenarios.loading.resolve import Entry, resolve
 from sim.rng import rng
 from sim.sequence import simulate
 from sim.types import Bools, Ints, Truth
+from tracking.episodes.grouping_episodes import SURVEYED, LabelErrors, with_label_errors
 from tracking.grouping.pair_evidence import evidence, frames_per_step, step_rows
-from tracking.tuning.grouping_episodes import SURVEYED, LabelErrors, with_label_errors
 
 SLOW = 2.5  # Frames/s of the slow copy.
 DETECTED = LabelErrors(0.1, 1e-3, filmed=False)

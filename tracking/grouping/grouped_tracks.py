@@ -25,11 +25,11 @@ from typing import Any
 
 import numpy as np
 
-from sim.io.formats.labelled_truth import chords
 from sim.truth.crossing_events import SAME_BEFORE, crossings
 from sim.truth.group_hulls import box_groups, groups_over_time
 from sim.truth.merge_split_rules import frames_of
 from sim.truth.queue_detection import ADVANCE_TIME, BRIDGE_TIME, queues
+from sim.truth.velocities import chords
 from sim.types import EVENT_KINDS, GroupEvent, Groups, Tracks
 from tracking.grouping.group_events import TrackedMotion, events_of_labels
 from tracking.grouping.group_labels import label_people

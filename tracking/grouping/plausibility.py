@@ -10,8 +10,9 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from sim.io.formats.labelled_truth import RUN, chords
+from sim.truth.velocities import chords
 from sim.types import Tracks
+from tracking.recordings.labelled_truth import RUN
 
 
 def implausible(name: str, people: Sequence[Tracks], fps: float, px_per_m: float) -> Iterator[str]:

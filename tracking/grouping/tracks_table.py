@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.formats.labelled_truth import chords
 from sim.truth.motion_rows import MotionRows
+from sim.truth.velocities import chords
 from sim.types import Array, Bools, Ints, Tracks
 
 

@@ -1,1 +1,1 @@
-"""One file per tracker, named after its method; each docstring names the paper."""
+"""The trackers of five papers, one package each; the first line of each package names its paper."""

@@ -144,7 +144,7 @@ def prepare(
     """Returns the tracker with all that it needs for the sequence; the arguments are as in `tracking.track`. Raises
     InputError if an argument is wrong or tracker and sequence do not fit."""
     if not isinstance(sequence, Sequence):
-        remedy = "open it: sim.io.source.open_source(path), or sim.simulate(scenario, seed)"
+        remedy = "open it: tracking.recordings.source.open_source(path), or sim.simulate(scenario, seed)"
         raise InputError(place="sequence", got=type(sequence).__name__, expected="a Sequence", remedy=remedy)
     if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or not 0 <= seed <= INTEGER:
         expected, remedy = f"a whole number from 0 to {INTEGER}", "give a smaller one, such as 0"

@@ -28,7 +28,7 @@ from tracking.running.prepare import Params, PreparedTracker, prepare
 from tracking.running.time_limit import TimeLimited
 
 if TYPE_CHECKING:
-    from sim.io.export.tidy_tables import TidyTables
+    from tracking.export.tidy_tables import TidyTables
     from tracking.grouping.belief import PairProbabilities
     from tracking.grouping.ground_of_boxes import Ground
 
@@ -73,7 +73,7 @@ def _facts(
     sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale, ground: Ground, begins: int | None
 ) -> dict[str, Any]:
     """Returns what run.json tells of tracks, whoever made them: of the sequence, plane, boxes, scale and causality."""
-    from sim.io.store.track_files import box_source
+    from sim.store.track_files import box_source
 
     begins = None if begins is None else max(begins, scale.frames, ground.frames)
     return {
@@ -99,7 +99,7 @@ def causal_from(sequence: Sequence) -> int | None:
     It is 1 if the sample does not come from the sequence's own pictures, and None if the sample contains frames from
     all over the recording.
     """
-    from sim.io.pictures.background_sample import BackgroundSample
+    from sim.pictures.background_sample import BackgroundSample
 
     sample = sequence.load_background
     if not isinstance(sample, BackgroundSample):
@@ -163,7 +163,7 @@ class TrackingRun(SequenceOf[Tracks]):
                 the unit of the tracks (m or px). `counts` gets columns with the number of people who cross the line or
                 are in the zone. None means neither.
         """
-        from sim.io.export.tidy_tables import run_tables
+        from tracking.export.tidy_tables import run_tables
 
         found = {name: np.asarray(corners, float) for name, corners in (places or {}).items()}
         return run_tables(self.tracks, self.info["fps"], found)
@@ -171,8 +171,8 @@ class TrackingRun(SequenceOf[Tracks]):
     def write(self, folder: str | Path, sequence: Sequence, pairs: PairProbabilities | None = None) -> Path:
         """Writes the tracks to the folder as `flockscope track` does, and returns the folder. sequence: what was
         tracked. pairs: a table of pair probabilities that is written, too; None writes none."""
-        from sim.io.store.seal import tracked_hash
-        from sim.io.store.track_files import pair_table, write_tracks
+        from sim.store.seal import tracked_hash
+        from sim.store.track_files import pair_table, write_tracks
 
         info = {**self.info, "truth_hash": tracked_hash(sequence)}
         table = None if pairs is None else pair_table(pairs.frame, pairs.a, pairs.b, pairs.probability)
@@ -199,7 +199,7 @@ def track(
     Args:
         tracker: A registered name, "file.py:Class", "module:Class", a class, an instance, or a TimeLimited
             (tracking.running.time_limit), which stops a step that hangs.
-        sequence: A `Sequence`, as `sim.simulate` and `sim.io.source.open_source` return.
+        sequence: A `Sequence`, as `sim.simulate` and `tracking.recordings.source.open_source` return.
         params: A config, values by name, the name of a preset, or the path of a TOML file. None takes the tracker's
             defaults; it must be None if `tracker` is an instance.
         detections: "image" (the tracker detects in pictures), "file" (stored detections) or "truth" (detections made

@@ -16,17 +16,17 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import FlockscopeError, InputError, WorkError, shortened
-from sim.io.files.atomic import write_file
+from sim.store.atomic import write_file
 from sim.types import DetectionMode
 from sim.workers.pool import RemoteTraceback
-from tracking.environment.episode_cache import OpenedSource, Source
-from tracking.environment.episodes import Episode, streams_for
+from tracking.episodes.episode import Episode, streams_for
+from tracking.episodes.episode_cache import OpenedSource, Source
+from tracking.episodes.parallel_episodes import EpisodeTask, opened_sources, play_task, playing_workers, used_by
+from tracking.episodes.tuned_tracker import TunedTracker, tuned_tracker
 from tracking.oracle import oracle
 from tracking.running.detection_mode import input_kind
 from tracking.running.tracker_registry import find
 from tracking.running.used_files import UsedFiles, changes
-from tracking.tuning.parallel_episodes import EpisodeTask, opened_sources, play_task, playing_workers, used_by
-from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
 
 ORACLE = "oracle"  # its name among the trackers
 TRACE_LINES = 8  # of the traceback of a failed tracker, the last ones

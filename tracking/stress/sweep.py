@@ -32,13 +32,13 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.hashing import runtime
 from sim.types import Array, DetectionMode
-from tracking.environment.episode_cache import Source, sources
-from tracking.environment.episodes import streams_for
+from tracking.episodes.episode import streams_for
+from tracking.episodes.episode_cache import Source, sources
+from tracking.episodes.parallel_episodes import EpisodeTask
+from tracking.episodes.tuned_tracker import TunedTracker
 from tracking.running.detection_mode import input_kind
 from tracking.stress.axes import Axis, BreakingPoint, Frontier, breaking_point, frontier
 from tracking.stress.scene_player import ORACLE, OracleTask, PlayScenes, Store
-from tracking.tuning.parallel_episodes import EpisodeTask
-from tracking.tuning.tuned_tracker import TunedTracker
 
 FIRST_VALUES = (5, 3)  # the second if the budget allows no two scenes at the first
 MOST_VALUES = 17

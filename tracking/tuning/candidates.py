@@ -24,14 +24,14 @@ from scenarios.errors import FlockscopeError, InputError, WorkError, counted
 from scenarios.loading.toml_files import did_you_mean
 from sim.dataset.generate import LEFT_OUT
 from tracking.config import Config
-from tracking.environment.episodes import Episode, Source
+from tracking.episodes.episode import Episode, Source
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import FEWEST, mean_of_known, paired
 
 if TYPE_CHECKING:
     import optuna
 
-    from tracking.tuning.parallel_episodes import PlayEpisodes
+    from tracking.episodes.parallel_episodes import PlayEpisodes
     from tracking.tuning.search_plan import SearchPlan
 
 SPEED = "frames/s"  # Key of the tracker's speed. It is the only goal that differs between two runs of the same episode.

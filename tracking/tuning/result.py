@@ -17,8 +17,8 @@ from typing import Any
 
 from scenarios.errors import counted
 from sim.hashing import installed
-from sim.io.files.atomic import write_file
-from sim.io.files.tables import plain
+from sim.store.atomic import write_file
+from sim.store.tables import plain
 from tracking.config import Config
 from tracking.tuning.candidates import Candidate, Comparison, TrialRecord
 from tracking.tuning.search_plan import SearchPlan, seeds_text

@@ -24,11 +24,11 @@ from sim.dataset.splits import SPLITS
 from sim.hashing import runtime
 from sim.types import DetectionMode
 from tracking.config import Config, Param, Value
-from tracking.environment.episodes import Source, sources
+from tracking.episodes.episode import Source, sources
+from tracking.episodes.tuned_tracker import TunedTracker, tuned_tracker
 from tracking.parameter_space import space_of
 from tracking.tuning.candidates import FAST_KEYS, SPEED, Goal, goals_of
 from tracking.tuning.options import TuneOptions
-from tracking.tuning.tuned_tracker import TunedTracker, tuned_tracker
 
 # Of each split: name of its option, name in texts, least number of episodes that its default seeds make.
 SPLIT_OPTIONS = {

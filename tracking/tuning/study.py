@@ -38,16 +38,16 @@ from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
 
 from scenarios.errors import FlockscopeError, InputError
-from tracking.environment.episodes import Episode
+from tracking.episodes.episode import Episode
+from tracking.episodes.parallel_episodes import PlayEpisodes
+from tracking.episodes.tuned_tracker import RULE
 from tracking.running.tracker_registry import find
 from tracking.running.used_files import UsedFiles, changes, folder_of, relative
 from tracking.stats import mean_of_known
 from tracking.tuning.candidates import STORED, TrialRecord
 from tracking.tuning.options import Progress
-from tracking.tuning.parallel_episodes import PlayEpisodes
 from tracking.tuning.sampler import PRUNED, distribution, propose, should_prune, tpe_sampler
 from tracking.tuning.search_plan import SearchPlan
-from tracking.tuning.tuned_tracker import RULE
 
 SUFFIX = ".locks"  # What the name of the lock file adds to the name of the journal.
 CHOOSING, WRITING, FIRST_TRIAL = 0, 1, 2  # Bytes of the lock file.

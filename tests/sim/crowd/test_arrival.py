@@ -12,7 +12,7 @@ from scenarios.loading.resolve import load
 from sim.crowd.arrival import has_way, stands
 from sim.crowd.navigation import scene_of
 from sim.crowd.world import run as simulated
-from sim.io.store.group_files import read_never_arrives
+from sim.store.group_files import read_never_arrives
 from tracking.app.cli import run
 
 SCENE = """

@@ -10,8 +10,8 @@ from scenarios.loading.resolve import load
 from sim.crowd.formation import standing
 from sim.crowd.order_execution import concerned
 from sim.crowd.world import World, run
-from sim.io.store.truth_files import truth_files
 from sim.sequence import observe
+from sim.store.truth_files import truth_files
 
 HEAD = """
 schema = 1

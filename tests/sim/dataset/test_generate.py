@@ -9,14 +9,14 @@ from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import Entry
 from sim.dataset.generate import generate
 from sim.dataset.splits import split_of
-from sim.io.files import atomic
-from sim.io.source import open_source
-from sim.io.store.seal import with_hash
-from sim.io.store.validate import validate
+from sim.store import atomic
+from sim.store.seal import with_hash
+from sim.store.validate import validate
 from sim.workers.pool import WorkerOptions
 from tests.fake_simulator import content, scenario
 from tests.processes import python
 from tests.small_disks import small_disk
+from tracking.recordings.source import open_source
 
 # A program of its own: simulate is a fake, in its workers too; argument 1 the folder, 2 workers, 3 what goes wrong.
 PROGRAM = """
@@ -30,7 +30,7 @@ sys.modules["sim.sequence"] = types.SimpleNamespace(simulate=simulate, observe=N
 from scenarios.loading.resolve import Entry
 from scenarios.schema.scenario import Scenario
 from sim.dataset.generate import generate
-from sim.io.files import atomic
+from sim.store import atomic
 from sim.workers.pool import WorkerOptions
 
 if __name__ == "__main__":

@@ -6,8 +6,8 @@ import pytest
 
 from scenarios.loading.resolve import Entry
 from sim.dataset.generate import generate
-from sim.io.source import open_source
 from tests.fake_simulator import content, scenario
+from tracking.recordings.source import open_source
 
 
 def test_streams_are_asked_for_and_stored(tmp_path, simulate):

@@ -8,7 +8,7 @@ import pytest
 
 from scenarios.loading.resolve import resolve
 from sim.dataset.generate import generate
-from sim.io.store.validate import validate
+from sim.store.validate import validate
 from tests.fake_simulator import content
 from tests.processes import python
 

@@ -12,13 +12,13 @@ from scenarios.loading.resolve import load, load_observation
 from sim.dataset.generate import store_replays
 from sim.dataset.replay import Cut
 from sim.dataset.splits import is_real
-from sim.io.formats.biwi import open_folder
-from sim.io.source import open_source
-from sim.io.store.validate import validate
 from sim.sequence import simulate
+from sim.store.validate import validate
 from sim.types import Sequence
 from tests.fake_simulator import content
 from tests.recordings import biwi_walk
+from tracking.recordings.biwi import open_folder
+from tracking.recordings.source import open_source
 
 SMALL = load_observation(set=["camera.image=[160, 120]", "camera.fps=5"])
 

@@ -12,10 +12,11 @@ from scenarios.errors import InputError
 from scenarios.loading.resolve import load, load_observation
 from scenarios.schema.scenario import ObservationSpec
 from sim.dataset.replay import Cut, replay
-from sim.io.formats.biwi import open_folder
 from sim.sequence import simulate
 from sim.types import Sequence
 from tests.recordings import mot_folder
+from tracking.recordings.biwi import open_folder
+from tracking.recordings.source import open_source
 
 
 @pytest.fixture
@@ -117,8 +118,8 @@ def test_boxes_alone_want_a_calibration(tmp_path: Path) -> None:
     ]
     mot_folder(tmp_path, "\n".join(lines), ini="name=boxes\nframeRate=10\nimWidth=640\nimHeight=480\n")
     with pytest.raises(InputError, match="--calibration"):
-        replay(tmp_path, ObservationSpec(), streams=())
-    made = replay(tmp_path, ObservationSpec(), calibration=own.camera, streams=())
+        replay(open_source(tmp_path)[0], ObservationSpec(), streams=())
+    made = replay(open_source(tmp_path)[0], ObservationSpec(), calibration=own.camera, streams=())
     shift = np.array(made.source["origin"]["shift"])
     away = made.truth.pos[made.truth.rows(51)] - shift - truth.pos[truth.rows(51)]  # type: ignore[index]
     assert np.abs(away).max() < 0.3  # a box's lower edge is the near side of the feet
@@ -127,7 +128,6 @@ def test_boxes_alone_want_a_calibration(tmp_path: Path) -> None:
 def test_a_source_of_no_use_is_refused(tmp_path: Path, walk: Sequence) -> None:
     for source, spec, words in (
         (Sequence("empty", 10.0, 5, lambda: iter(())), ObservationSpec(), "no labelled people"),
-        (tmp_path / "nowhere", ObservationSpec(), "nothing there"),
         (walk, tmp_path / "none.toml", "No such file"),
     ):
         with pytest.raises(InputError, match=words):

@@ -12,7 +12,7 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import Entry
 from sim.dataset.generate import JobOutcome, SequenceJob, is_stored, run_job, stored_manifest
-from sim.io.files import atomic
+from sim.store import atomic
 from tests.fake_simulator import FakeSimulator, scenario
 
 

@@ -10,9 +10,9 @@ import pytest
 from scenarios import load
 from scenarios.schema.sensor import Sensor
 from sim.detector.draws import false_scores, true_scores
-from sim.io.source import open_source
 from sim.sequence import simulate
 from tracking.fitting.detection_matching import match_sequence
+from tracking.recordings.source import open_source
 
 U = np.linspace(0.1, 0.9, 9)
 CUT = 0.5  # the detector of both recordings reports no score below

@@ -10,7 +10,7 @@ import pytest
 import sim
 from scenarios import load
 from scenarios.loading.toml_files import dump
-from sim.io.store.sequence_folder import open_sequence, write_sequence
+from sim.store.sequence_folder import open_sequence, write_sequence
 from sim.types import Array
 
 SWITCH = "light.switch=[{at = 4.0, gain = 0.5, ramp = 0.0}]"

@@ -9,13 +9,13 @@ from scenarios import load
 from scenarios.errors import InputError
 from scenarios.limits import SCALES, is_number
 from scenarios.schema.scenario import CameraSpec
-from sim.io.formats.calibration import read_calibration
 from sim.scene.body import person_boxes
 from sim.scene.camera import camera_rotation, px_per_m_at_centre, require_camera
 from sim.scene.camera_placement import MARGIN, place_camera
 from sim.sequence import simulate
 from sim.types import Camera, Motion
 from tests.reference_sense import crowd, walkers
+from tracking.recordings.calibration import read_calibration
 
 
 def extremes(camera: Camera, motion: Motion) -> np.ndarray:

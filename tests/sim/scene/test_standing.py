@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from scenarios.loading.resolve import load
-from sim.io.source import open_source
 from sim.scene.body import person_boxes
 from sim.scene.camera import project, to_ground
 from sim.scene.standing import standing_points, stature_doubt
@@ -16,6 +15,7 @@ from sim.scene.terrain import height_at
 from sim.sequence import simulate
 from sim.types import Array, Camera, Scene, Stairs, Truth
 from tests.reference_sense import above, pinhole
+from tracking.recordings.source import open_source
 
 
 def people(camera: Camera, seed: int, count: int = 200) -> tuple[Array, Array, Array, Array]:

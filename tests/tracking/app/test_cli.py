@@ -335,13 +335,13 @@ def test_ctrl_c_that_became_another_error(place, capsys, monkeypatch):
         except KeyboardInterrupt:
             raise ImportError("a library failed to import")  # noqa: B904
 
-    monkeypatch.setattr("sim.io.export.coco.coco", load)
+    monkeypatch.setattr("tracking.export.coco.coco", load)
     assert run(words(COMMANDS["export coco"][0], place)) == 130
     check_output(capsys, 130, as_json=False)
 
 
 def test_a_bug_is_one_line_and_shown_whole_when_asked_for(place, capsys, monkeypatch):
-    monkeypatch.setattr("sim.io.export.coco.coco", _raise(KeyError("lost")))
+    monkeypatch.setattr("tracking.export.coco.coco", _raise(KeyError("lost")))
     line = words(COMMANDS["export coco"][0], place)
     assert run(line) == 1
     printed = capsys.readouterr().err

@@ -16,8 +16,8 @@ from scenarios.errors import InputError
 from scenarios.loading.toml_files import apply_settings
 from scenarios.loading.validation import validate
 from scenarios.schema.scenario import Scenario
-from sim.io.store.sequence_folder import sequence_files
-from sim.io.store.track_files import tracks_files
+from sim.store.sequence_folder import sequence_files
+from sim.store.track_files import tracks_files
 from tests.commands import commands
 from tests.processes import FAKE, ROOT
 from tracking import track
@@ -438,19 +438,19 @@ ELSEWHERE = {
     ("score", "workers"),
     ("score", "csv"),  # tests/tracking/scoring/test_protocols.py
     ("generate", "cluster"),  # and on a cluster: tests/sim/dataset/test_generate_cluster.py
-    ("kitti", "folder"),  # tests/sim/io/export/test_kitti.py
+    ("kitti", "folder"),  # tests/tracking/export/test_kitti.py
     ("demo", "quick"),  # the long one is for `make demo`
     ("generate", "sensor"),  # commands/test_fit.py
     ("track", "sensor"),
     ("track", "grouping"),  # commands/test_fit.py
-    *(("track", option) for option in ("boxes", "min_score")),  # tests/sim/io/formats/test_detector_boxes.py
+    *(("track", option) for option in ("boxes", "min_score")),  # tests/tracking/recordings/test_detector_boxes.py
     ("track", "step_timeout"),  # tests/tracking/running/test_time_limit.py
     ("view", "by"),  # report/test_in_browser.py
     ("view", "workers"),
-    # tests/sim/io/formats/test_mot_people.py
+    # tests/tracking/recordings/test_mot_people.py
     *((name, "person_class") for name in ("coco", "score", "track", "view", "sheet", "overlay")),
     *((name, "person_class") for name in ("csv", "parquet", "trajnet", "pedpy")),
-    *((command, "box_scale") for command in ("score", "track")),  # tests/sim/io/formats/test_box_columns.py
+    *((command, "box_scale") for command in ("score", "track")),  # tests/tracking/recordings/test_box_columns.py
 }
 # Commands whose options are tested one by one in commands/, ../stress, ../errors, and test_*.py here.
 OWN = (

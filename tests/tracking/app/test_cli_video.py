@@ -123,7 +123,7 @@ def test_options_that_cannot_work(option, words, tmp_path, capsys, monkeypatch):
     path = film(tmp_path)
     text(tmp_path / "text.png")
     cv2.imwrite(str(tmp_path / "small.png"), np.swapaxes(picture(0), 0, 1))
-    monkeypatch.setattr("sim.io.pictures.background_sample.BackgroundSample.__call__", None)
+    monkeypatch.setattr("sim.pictures.background_sample.BackgroundSample.__call__", None)
     line = refused(capsys, "track", "blob", path, "--out", tmp_path / "out", *option.format(tmp_path).split())
     assert all(word in line for word in words), line
     assert not (tmp_path / "out").exists()

@@ -1,9 +1,13 @@
-"""Runs guides from top to bottom in an empty folder, and compares what they print; runs README with fewer seeds."""
+"""Runs guides from top to bottom in an empty folder, and compares what they print; runs README with fewer seeds.
+
+`pytest tests/tracking/app/test_guides.py --write-guides` writes what is printed into the guides.
+"""
 
 from __future__ import annotations
 
 import re
 import shlex
+from difflib import SequenceMatcher
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +22,10 @@ BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 SAVED = re.compile(r"Save this as `([^`]+)`")
 
 
-def play(text: str, data: bool, capsys: pytest.CaptureFixture[str]) -> list[str]:
+def play(text: str, data: bool, capsys: pytest.CaptureFixture[str], again: list[str] | None = None) -> list[str]:
     """Runs the blocks in order and returns the commands that ran. data: also those that read the folder `data`.
+
+    again: receives what stands in place of each text, which is then not compared.
 
     A block whose preceding text says "Save this as" becomes a file. Others: python is a script, text is what the last
     command printed, to the letter but for lines that a line "…" stands for, sh is not run, and lines of a block without
@@ -34,7 +40,10 @@ def play(text: str, data: bool, capsys: pytest.CaptureFixture[str]) -> list[str]
             exec(compile(body, "guide", "exec"), {})
         elif kind == "text":
             shown = "\n".join(map(str.rstrip, printed.splitlines()))
-            assert shows(body.rstrip("\n"), shown), f"{done[-1]} printed:\n{shown}"
+            if again is None:
+                assert shows(body.rstrip("\n"), shown), f"{done[-1]} printed:\n{shown}"
+            else:
+                again.append(printed_again(body, shown) + "\n")
         elif not kind and (data or "data/" not in body):
             for line in body.splitlines():
                 capsys.readouterr()
@@ -53,10 +62,37 @@ def shows(body: str, printed: str) -> bool:
     return re.fullmatch("\n".join(lines), printed, re.DOTALL) is not None
 
 
+def printed_again(body: str, printed: str) -> str:
+    """Returns the part of a printed text that a body with lines "…" shows, by the most similar lines."""
+    lines, out, start = printed.splitlines(), list[str](), 0
+    stretches = [part.splitlines() for part in re.split(r"^…$\n?", body, flags=re.MULTILINE)]
+    for k, part in enumerate(stretches):
+        if k == len(stretches) - 1 and k and part:  # the last stretch ends the text
+            start = max(start, len(lines) - len(part))
+        elif k and part:
+            likeness = [SequenceMatcher(None, part[0], line).ratio() for line in lines[start:]]
+            start += likeness.index(max(likeness))
+        end = len(lines) if len(stretches) == 1 else start + len(part)
+        out += ([] if k == 0 else ["…"]) + lines[start:end]
+        start = end
+    return "\n".join(out)
+
+
+def test_printed_again():
+    assert printed_again("a 1\nb 1\n…\nd 1\n", "a 2\nb 2\nc 2\nc 3\nd 2") == "a 2\nb 2\n…\nd 2"
+    assert printed_again("a 1\n…\nseed 1\n…\n", "a 2\nc 2\nseed 2\ne") == "a 2\n…\nseed 2\n…"
+    assert printed_again("a\n", "b\nc") == "b\nc"
+
+
 def follow(name: str, data: bool, capsys: pytest.CaptureFixture[str]) -> None:
-    """Plays a guide; with data, all its commands must have run."""
-    text = (GUIDES / f"{name}.md").read_text(encoding="utf-8")
-    done = play(text, data, capsys)
+    """Plays a guide; with data, all its commands must have run. With --write-guides its texts are written again."""
+    page = GUIDES / f"{name}.md"
+    text = page.read_text(encoding="utf-8")
+    again = list[str]() if capsys.request.config.getoption("--write-guides") else None
+    done = play(text, data, capsys, again)
+    if again is not None:
+        texts = iter(again)
+        page.write_text(BLOCK.sub(lambda b: f"```text\n{next(texts)}```" if b[1] == "text" else b[0], text), "utf-8")
     assert len(done) >= 2 or name == "python"
     if data:
         unrun = re.sub(r"^```sh\n.*?^```$", "", text, flags=re.DOTALL | re.MULTILINE)

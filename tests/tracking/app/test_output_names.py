@@ -13,7 +13,7 @@ from urllib.parse import unquote, urlsplit
 
 import numpy as np
 
-from sim.io.store.seal import read_manifest, with_hash
+from sim.store.seal import read_manifest, with_hash
 from tests.recordings import mot_folder
 from tests.refusals import answer, refused
 from tracking.app.cli import run

@@ -11,15 +11,15 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.store.seal import read_manifest, with_hash
+from sim.store.seal import read_manifest, with_hash
 from tests.processes import ROOT
 from tests.short_scene import SCENE
 from tracking.app import progress
 from tracking.app.cli import run
 from tracking.app.command_line import _print_warnings_once
 from tracking.app.command_result import CommandResult, print_error, print_result
-from tracking.app.commands.score_tables import table
 from tracking.app.progress import ProgressMeter
+from tracking.app.score_tables import table
 
 NAMES = ("[/red]", "x[door]y", ":smile:", "\x1b[31mred", "a\u202eb", "[link=http://x]y[/link]")
 SHOWN = ("[/red]", "x[door]y", ":smile:", "\\x1b[31mred", "a\\u202eb", "[link=http://x]y[/link]")

@@ -13,10 +13,9 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError, WorkError
-from sim.io.files.atomic import lock_folder
-from sim.io.source import open_source
-from sim.io.store.seal import read_run
-from sim.io.store.validate import validate
+from sim.store.atomic import lock_folder
+from sim.store.seal import read_run
+from sim.store.validate import validate
 from sim.types import Sequence
 from tests.processes import FAKE
 from tests.recordings import mot_folder
@@ -24,6 +23,7 @@ from tests.refusals import answer, refused
 from tests.short_scene import SCENE, write_short_scene
 from tracking.app.cli import run
 from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.recordings.source import open_source
 from tracking.running.run import track
 
 ROWS = "".join(f"{k},1,{10 + k},10,20,40,1,1,1\n{k},2,{40 - k},12,20,40,1,1,1\n" for k in range(1, 9))

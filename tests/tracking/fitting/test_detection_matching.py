@@ -14,7 +14,6 @@ from scenarios.loading.resolve import load
 from scenarios.schema.sensor import Memory
 from sim.detector.draws import correlated_normals
 from sim.geometry import boxes
-from sim.io.source import open_source
 from sim.sequence import simulate
 from sim.types import Detections, Truth
 from tests.hand_made import with_rows
@@ -23,6 +22,7 @@ from tracking.fitting import detection_matching as matching
 from tracking.fitting.error_correlation import bivariate_normal_cdf, correlations, fit_memory, miss_correlations
 from tracking.fitting.error_statistics import error_statistics, miss_runs
 from tracking.fitting.false_alarms import alarm_tracks
+from tracking.recordings.source import open_source
 
 
 def truth_of(boxes: dict[int, list[list[float] | None]]) -> Truth:

@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 
 from scenarios.loading.resolve import load
-from sim.io.formats.labelled_truth import labelled_truth_fields
 from sim.sequence import simulate
 from sim.types import GroupEvent, Groups, Tracks
 from tests.reference_sense import paced
 from tracking.grouping.grouped_tracks import derive, events_at_end, with_groups
 from tracking.grouping.link_rule import LinkRule
+from tracking.recordings.labelled_truth import labelled_truth_fields
 from tracking.running.run import TrackingRun, group, track
 
 FPS = 10.0

@@ -18,11 +18,12 @@ import pytest
 
 import tracking
 from scenarios.errors import WorkError
-from sim.io.store.track_files import read_tracks, write_tracks
+from sim.store.track_files import write_tracks
 from sim.types import Groups
 from tests.tracking.running.test_run import Stranger, source
 from tests.tracking.running.test_tracks_check import SQUARE, answer, event, group
 from tracking.app.cli import run
+from tracking.recordings.track_texts import read_tracks
 from tracking.running.run import track
 from tracking.running.tracks_check import check_tracks
 

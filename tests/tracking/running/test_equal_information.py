@@ -10,13 +10,13 @@ import pytest
 from scenarios.loading.resolve import load
 from sim.dataset.generate import generate
 from sim.detector.sense import sense_owned
-from sim.io.source import open_source
 from sim.scene.standing import standing_points
 from sim.sequence import simulate
 from sim.truth.label import bodies
 from sim.types import Detections, Frame, Sequence, Tracks
 from tests.tracking.running.test_run import Stranger
 from tracking.oracle import named_detections, oracle
+from tracking.recordings.source import open_source
 from tracking.running.detection_mode import as_needed, from_truth, given_detections
 from tracking.running.prepare import prepare
 from tracking.running.run import input_name, track

@@ -96,7 +96,7 @@ def test_a_file_imports_the_files_beside_it(tmp_path):
 
 def test_workers_in_another_folder_find_the_file(tmp_path, monkeypatch):
     """`tune FILE.py:Class --cluster` with a relative path was looked for in the folder of each worker."""
-    from tracking.tuning.tuned_tracker import tuned_tracker
+    from tracking.episodes.tuned_tracker import tuned_tracker
 
     (tmp_path / "own").mkdir()
     (tmp_path / "own" / "toy.py").write_text(TUNABLE)

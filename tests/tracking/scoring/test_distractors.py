@@ -7,10 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sim.io.source import open_source
-from sim.io.store.track_files import read_tracks
 from sim.types import Truth
 from tests.reference_trackeval import trackeval_files
+from tracking.recordings.source import open_source
+from tracking.recordings.track_texts import read_tracks
 from tracking.scoring.evaluation import Scorer, Scores, evaluate
 
 pytestmark = pytest.mark.filterwarnings("ignore")

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 from benchmarks.metrics import BOTH, ROW, file_differences, trackeval_rows, written_dataset
-from sim.io.source import open_source
-from sim.io.store.track_files import read_tracks
 from tests.refusals import answer
 from tracking.app.cli import run
+from tracking.recordings.source import open_source
+from tracking.recordings.track_texts import read_tracks
 from tracking.scoring import evaluate, pooled
 from tracking.scoring.evaluation import Scores
 

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from sim.io.source import open_source
-from sim.io.store.track_files import read_tracks
 from tests.reference_trackeval import trackeval_files
 from tests.refusals import answer
 from tracking.app.cli import run
+from tracking.recordings.source import open_source
+from tracking.recordings.track_texts import read_tracks
 from tracking.scoring import evaluate
 
 pytestmark = pytest.mark.filterwarnings("ignore")

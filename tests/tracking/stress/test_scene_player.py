@@ -10,9 +10,9 @@ import tracking
 from scenarios.errors import InputError
 from tests.processes import FAKE
 from tests.tuning_toys import TOY, write_scenes
-from tracking.environment.episode_cache import sources
+from tracking.episodes.episode_cache import sources
+from tracking.episodes.parallel_episodes import EpisodeTask
 from tracking.stress.scene_player import ORACLE, OracleTask, contender, play_scene, scene_player
-from tracking.tuning.parallel_episodes import EpisodeTask
 
 RAISING = """
 import os

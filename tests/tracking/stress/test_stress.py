@@ -10,12 +10,12 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
-from tracking.environment.episode_cache import Source
+from tracking.episodes.episode_cache import Source
+from tracking.episodes.parallel_episodes import EpisodeTask
+from tracking.episodes.tuned_tracker import TunedTracker
 from tracking.stress.axes import AXES, NEVER, breaking_point, crossing, frontier, parse_axes, parse_axis, shares
 from tracking.stress.scene_player import Outcome, Store, Tasks
 from tracking.stress.sweep import Plan, Sweep
-from tracking.tuning.parallel_episodes import EpisodeTask
-from tracking.tuning.tuned_tracker import TunedTracker
 
 WAY = np.linspace(0, 1, 9)
 

@@ -11,11 +11,11 @@ import pytest
 
 from scenarios.errors import InputError
 from tests.tracking.stress.test_stress import sweep_of
+from tracking.episodes.parallel_episodes import EpisodeTask
 from tracking.stress.axes import parse_axes
 from tracking.stress.scene_player import Outcome, Tasks
 from tracking.stress.sweep import Sweep
 from tracking.stress.worst_scenes import NEAR, SearchedScene, search, worst
-from tracking.tuning.parallel_episodes import EpisodeTask
 
 HOLES = {"cross": (0.5, 4.0), "pass-by": (0.9, 1.0)}  # by scenario, detection and clutter where the tracker is worst
 

@@ -11,7 +11,7 @@ import pytest
 from scenarios.errors import WorkError
 from tests.toy_tracker import ToyConfig
 from tests.tuning_toys import toy_plan, tune_arguments
-from tracking.environment.episodes import Episode
+from tracking.episodes.episode import Episode
 from tracking.tuning.candidates import Candidate, Goal, HeldOutEvaluator, compare_episodes, pareto_front
 from tracking.tuning.search import tune
 from tracking.tuning.search_plan import SearchPlan
@@ -105,6 +105,6 @@ def test_the_same_command_again_plays_nothing(tmp_path, monkeypatch):
     def never(*_):
         raise AssertionError("an episode was played")
 
-    monkeypatch.setattr("tracking.tuning.parallel_episodes.play_task", never)
+    monkeypatch.setattr("tracking.episodes.parallel_episodes.play_task", never)
     assert str(tune(**given, out=tmp_path / "toy.toml")) == str(first)
     assert (tmp_path / "toy.json").read_bytes() == content

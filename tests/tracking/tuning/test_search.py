@@ -15,14 +15,14 @@ from scenarios.errors import FlockscopeError, InputError
 from tests.processes import ROOT
 from tests.toy_tracker import Toy, ToyConfig
 from tests.tuning_toys import TOY, toy_plan, tune_arguments
-from tracking.tuning.parallel_episodes import episode_player
+from tracking.episodes.parallel_episodes import episode_player
 from tracking.tuning.search import tune
 from tracking.tuning.study import LEFT_OUT, open_study, run_trials
 
 KILLED_AT = """
 import os, signal, sys
 from pathlib import Path
-import tracking.tuning.parallel_episodes as work
+import tracking.episodes.parallel_episodes as work
 from tests.tuning_toys import toy_plan, tune_arguments
 from tracking.tuning.search import tune
 played, attempt = 0, work.play_task

@@ -9,10 +9,10 @@ import pytest
 
 from scenarios.errors import InputError, WorkError
 from tests.tuning_toys import TOY, toy_plan, write_scenes
-from tracking.environment.episodes import Episode, sources
-from tracking.tuning.parallel_episodes import EpisodeTask, play_task
+from tracking.episodes.episode import Episode, sources
+from tracking.episodes.parallel_episodes import EpisodeTask, play_task
+from tracking.episodes.tuned_tracker import tuned_tracker
 from tracking.tuning.study import SearchStudy, open_study, run_trials
-from tracking.tuning.tuned_tracker import tuned_tracker
 
 
 class Game:

@@ -25,14 +25,14 @@ import numpy as np
 from scenarios.errors import InputError, counted, shortened
 from scenarios.limits import INTEGER, is_number
 from sim.hashing import canonical_hash
-from sim.io.files.atomic import write_file
-from sim.io.files.own_files import output_file
-from sim.io.files.tables import json_document, read_json
+from sim.store.atomic import write_file
+from sim.store.own_files import output_file
+from sim.store.tables import json_document, read_json
 from sim.types import Array, Bools
 from sim.types import Sequence as Recording
 from tracking.app.command_options import CompareOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import checked_key, figure, table
+from tracking.app.score_tables import checked_key, figure, table
 from tracking.scoring.catalogue import CATALOGUE, SCORER
 from tracking.stats import FEWEST, compared
 

@@ -33,8 +33,8 @@ def generate(options: GenerateOptions) -> CommandResult:
 
 def validate(options: ValidateOptions) -> CommandResult:
     """Checks a generated sequence or dataset, or stored tracks; changes nothing."""
-    from sim.io.store.validate import content_hash
-    from sim.io.store.validate import validate as check
+    from sim.store.validate import content_hash
+    from sim.store.validate import validate as check
 
     folder = options.folder
     problems = check(folder)
@@ -55,6 +55,7 @@ def replay(options: ReplayCommandOptions) -> CommandResult:
     from sim.dataset.generate import store_replays
     from sim.dataset.replay import Cut
     from tracking.app.sequence_workers import source_of
+    from tracking.recordings.calibration import read_calibration
 
     seeds = option_parsing.seeds(options.seeds)
     streams, images = option_parsing.pictures(options.streams, options.images)
@@ -63,10 +64,11 @@ def replay(options: ReplayCommandOptions) -> CommandResult:
     settings = option_parsing.scenario_settings(options.settings)
     view = load_observation(options.camera, [*option_parsing.sensor_settings(options.sensor), *settings])
     recordings = source_of(options, options.source, without="camera").open()
+    calibration = None if options.calibration is None else read_calibration(options.calibration)
     cut = Cut(options.start, options.duration)
     with ProgressMeter("replay") as meter:
         folders = store_replays(
-            recordings, view, seeds, options.out, cut=cut, calibration=options.calibration, streams=streams,
+            recordings, view, seeds, options.out, cut=cut, calibration=calibration, streams=streams,
             images=images, progress=meter.update,
         )  # fmt: skip
     text = f"{counted(len(folders), 'sequence')} in {folders[0].parent}"

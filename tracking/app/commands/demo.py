@@ -16,14 +16,14 @@ from itertools import zip_longest
 from pathlib import Path
 
 from scenarios.errors import counted
-from sim.io.files.own_files import GENERATOR, address, output_path
+from sim.store.own_files import GENERATOR, address, output_path
 from sim.types import DetectionMode, Sequence
 from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_ranking import COLUMNS, interval, rank_words, shown_columns, usual_key, verdict
-from tracking.app.commands.score_tables import SIMILARITY, number, table
 from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
+from tracking.app.score_ranking import COLUMNS, interval, rank_words, shown_columns, usual_key, verdict
+from tracking.app.score_tables import SIMILARITY, number, table
 from tracking.comparison import ComparedRuns, compare
 from tracking.running import tracker_registry
 from tracking.running.run import TrackingRun
@@ -56,10 +56,10 @@ class _TrackJob:
 def demo(options: DemoOptions) -> CommandResult:
     """Writes simulated scenes, tracks and pages into the folder --out; scenes that are already there are kept."""
     from sim.dataset.generate import generate
-    from sim.io.files.atomic import write_file
-    from sim.io.files.own_files import refuse_foreign_file
-    from sim.io.source import open_source
+    from sim.store.atomic import write_file
+    from sim.store.own_files import refuse_foreign_file
     from tracking.app.replay_page.page import theme
+    from tracking.recordings.source import open_source
 
     start, out, quick = time.monotonic(), options.out, options.quick
     page = out / "index.html"
@@ -129,8 +129,8 @@ def _runs(jobs: Iterable[_TrackJob], count: int, workers: int) -> dict[_TrackJob
 
 
 def _tracked(job: _TrackJob) -> list[TrackingRun]:
-    from sim.io.source import open_source
     from tracking.app.pictures.overlay import write_overlay
+    from tracking.recordings.source import open_source
 
     runs = []
     for folder in job.folders:

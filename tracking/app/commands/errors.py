@@ -7,8 +7,8 @@ from typing import Any
 from sim.types import Sequence
 from tracking.app.command_options import ErrorsOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import figure, table
-from tracking.app.commands.scored_sequence import ScoringJob, read_runs, scoring_jobs
+from tracking.app.score_tables import figure, table
+from tracking.app.scored_sequence import ScoringJob, read_runs, scoring_jobs
 from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.errors.found import RunErrors, errors_of_run, sums_by_cause
 from tracking.errors.repairs import SHOWN

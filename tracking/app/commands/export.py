@@ -1,6 +1,6 @@
 """`flockscope export`: datasets as COCO, KITTI and webdataset; runs and truths as CSV, Parquet, TrajNet++ and PedPy.
 
-The formats themselves are in sim.io.export.
+The formats themselves are in tracking.export.
 """
 
 from __future__ import annotations
@@ -8,22 +8,22 @@ from __future__ import annotations
 from functools import partial
 
 from scenarios.errors import InputError, counted
-from sim.io.export.tidy_tables import Form, Places, TidyTables, parse_places, run_tables, truth_tables, write_tables
-from sim.io.formats.options import refuse_options
-from sim.io.store.seal import reject_sealed
-from sim.io.store.track_files import read_checked_tracks
+from sim.store.seal import reject_sealed
 from sim.types import Sequence
 from tracking.app.command_options import CocoOptions, CsvOptions, KittiOptions, TrajnetOptions, WebdatasetOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 from tracking.app.sequence_workers import source_of
 from tracking.app.stored_tracks import STATED, StoredTracks, find_tracks, holds_tracks, run_folders
+from tracking.export.tidy_tables import Form, Places, TidyTables, parse_places, run_tables, truth_tables, write_tables
+from tracking.recordings.options import refuse_options
+from tracking.recordings.track_texts import read_checked_tracks
 
 
 def export_coco(options: CocoOptions) -> CommandResult:
     """Writes a COCO file of all sequences with labelled boxes at the path of the options."""
-    from sim.io.export.coco import coco
-    from sim.io.files.own_files import output_file
+    from sim.store.own_files import output_file
+    from tracking.export.coco import coco
 
     path = coco(options.folder, output_file(options.out, ".json"), person_class=options.person_class)
     root = options.folder if options.folder.is_dir() else options.folder.parent
@@ -32,7 +32,7 @@ def export_coco(options: CocoOptions) -> CommandResult:
 
 def export_kitti(options: KittiOptions) -> CommandResult:
     """Writes pairs, disparities and calibrations of all sequences of a generated dataset into the folder --out."""
-    from sim.io.export.kitti import kitti
+    from tracking.export.kitti import kitti
 
     folders = kitti(options.folder, options.out)
     return CommandResult({"folders": folders}, "\n".join(map(str, folders)))
@@ -40,7 +40,7 @@ def export_kitti(options: KittiOptions) -> CommandResult:
 
 def export_webdataset(options: WebdatasetOptions) -> CommandResult:
     """Writes tar shards of all sequences of a generated dataset into the folder of --out, and an index.json."""
-    from sim.io.export.webdataset import size_of, webdataset
+    from tracking.export.webdataset import size_of, webdataset
 
     out, size = options.out, size_of(options.shard_size)
     with ProgressMeter("export") as meter:

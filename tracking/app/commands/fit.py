@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from scenarios.errors import printable
-from sim.io.files.own_files import output_file
+from sim.store.own_files import output_file
 from sim.types import Truth
 from tracking.app import option_parsing
 from tracking.app.command_options import FitGroupingOptions, FitJointOptions, FitRelationalOptions, FitSensorOptions
@@ -24,11 +24,11 @@ CHECK_SEEDS = range(30_000, 30_008)
 def fit_sensor(options: FitSensorOptions) -> CommandResult:
     """Writes the profile of the detector behind the recordings, pooled over all of them, as a TOML file."""
     from scenarios.loading.resolve import dump_sensor
-    from sim.io.files.atomic import write_file
-    from sim.io.source import open_source
+    from sim.store.atomic import write_file
     from tracking.fitting.detection_matching import match_sequence
     from tracking.fitting.error_statistics import error_statistics, simulated_detections
     from tracking.fitting.sensor import fit_matched
+    from tracking.recordings.source import open_source
     from tracking.stats import mean_of_finite
 
     out = output_file(options.out, ".toml")
@@ -53,7 +53,7 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
 
 def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     """Writes the belief fitted to simulated scenes as a TOML file, with the command and its scores as comments."""
-    from sim.io.files.atomic import write_file
+    from sim.store.atomic import write_file
     from tracking.fitting.belief import belief_scores, fit_belief, sample_of
     from tracking.fitting.grouping_scenes import pair_scenes
 
@@ -89,7 +89,7 @@ def _comments(kind: str, options: FitJointOptions, more: Iterable[str], scores: 
 
 def fit_joint(options: FitJointOptions) -> CommandResult:
     """Writes the fitted weights of the event classifier as a TOML file, with command and scores as comments."""
-    from sim.io.files.atomic import write_file
+    from sim.store.atomic import write_file
     from tracking.fitting.joint_events import EventRows, event_rows, event_scores, fit_events
     from tracking.papers.joint.config import EVENT_TIME
 
@@ -109,8 +109,8 @@ def fit_joint(options: FitJointOptions) -> CommandResult:
 def fit_relational(options: FitRelationalOptions) -> CommandResult:
     """Writes the fitted parameters of `relational` as a TOML file."""
     from scenarios.loading.resolve import resolve
-    from sim.io.files.atomic import write_file
     from sim.sequence import simulate
+    from sim.store.atomic import write_file
     from tracking.fitting import relational
     from tracking.papers.relational.config import RelationalConfig
 

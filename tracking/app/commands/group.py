@@ -16,17 +16,17 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError, counted, shortened
-from sim.io.formats.options import refuse_options
 from sim.types import EVENT_KINDS, Sequence
 from tracking.app.command_options import GroupOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import table
 from tracking.app.progress import ProgressMeter
+from tracking.app.score_tables import table
 from tracking.app.sequence_workers import source_of
 from tracking.app.stored_tracks import STATED, StoredTracks, check_place, find_tracks, holds_tracks, run_folders
 from tracking.grouping.belief import Belief, pair_probabilities
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
 from tracking.grouping.plausibility import median_speed
+from tracking.recordings.options import refuse_options
 from tracking.running import run as runs
 from tracking.running.run import TrackingRun
 

@@ -13,16 +13,16 @@ from scenarios.errors import InputError, counted, printable
 from scenarios.loading.resolve import load, names, resolve
 from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import Scenario
-from sim.io.files.atomic import write_file
-from sim.io.files.own_files import output_file, refuse_foreign_file
 from sim.sequence import simulate
+from sim.store.atomic import write_file
+from sim.store.own_files import output_file, refuse_foreign_file
 from sim.types import Sequence
 from tracking.app.command_options import MinimizeOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import number, table
 from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
-from tracking.environment.episodes import streams_for
+from tracking.app.score_tables import number, table
+from tracking.episodes.episode import streams_for
 from tracking.grouping.grouping_choice import default_grouping
 from tracking.grouping.link_rule import LinkRule
 from tracking.running.tracker_registry import find
@@ -97,7 +97,7 @@ def _scene_and_tracker(options: MinimizeOptions) -> tuple[Scene, TrackerSetup]:
 
 def _of_run(folder: Path) -> tuple[Scene, TrackerSetup]:
     """Returns the scene and the tracker of a run, with its parameters and inputs."""
-    from sim.io.store.seal import check_run, is_run, read_manifest
+    from sim.store.seal import check_run, is_run, read_manifest
     from sim.types import BACKGROUNDS, OWN_BACKGROUND
 
     info = check_run(folder) if is_run(folder) else {}
@@ -128,7 +128,7 @@ def _of_run(folder: Path) -> tuple[Scene, TrackerSetup]:
 
 def _sequence_of(info: Mapping[str, Any]) -> Path | None:
     """Returns the sequence of a run, which is looked for below the working folder, by name and hash of the truth."""
-    from sim.io.store.seal import read_manifest
+    from sim.store.seal import read_manifest
 
     for pattern in SEQUENCES:
         for path in sorted(Path().glob(f"*/{pattern}")):

@@ -49,8 +49,8 @@ def explain(name: str, settings: list[str], drawing: Path | None) -> CommandResu
     data = {"name": scenario.name, "about": scenario.about, "text": words, "toml": dump(scenario)}
     if drawing is None:
         return CommandResult(data, words)
-    from sim.io.files.atomic import write_file
-    from sim.io.files.own_files import output_file
+    from sim.store.atomic import write_file
+    from sim.store.own_files import output_file
 
     write_file(output_file(drawing, ".svg"), svg(scenario).encode())
     return CommandResult({**data, "drawing": drawing}, f"{words}\n{drawing}")

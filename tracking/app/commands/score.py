@@ -5,19 +5,19 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
-from sim.io.files.atomic import write_file
-from sim.io.files.own_files import output_file, refuse_foreign_file
-from sim.io.formats.options import refuse_options
-from sim.io.store.seal import tracked_hash
+from sim.store.atomic import write_file
+from sim.store.own_files import output_file, refuse_foreign_file
+from sim.store.seal import tracked_hash
 from sim.types import Sequence
 from tracking.app.command_options import ScoreOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.commands.compare import conditions
-from tracking.app.commands.score_ranking import ranked_runs, ranking_result, scoring_notes
-from tracking.app.commands.score_tables import CSV_HEAD, checked_key, csv_bytes, summary, tables
-from tracking.app.commands.scored_sequence import is_class, run_names, score_sequence, scoring_jobs
+from tracking.app.score_ranking import ranked_runs, ranking_result, scoring_notes
+from tracking.app.score_tables import CSV_HEAD, checked_key, csv_bytes, summary, tables
+from tracking.app.scored_sequence import is_class, run_names, score_sequence, scoring_jobs
 from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.comparison import ComparedSequence, check_blocks
+from tracking.recordings.options import refuse_options
 from tracking.scoring import pooled
 from tracking.stats import SURE
 

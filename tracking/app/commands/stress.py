@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError, counted, printable
-from sim.io.files.atomic import lock_folder, write_file
-from sim.io.files.own_files import refuse_foreign_file
-from sim.io.files.tables import json_document, plain, table_bytes
+from sim.store.atomic import lock_folder, write_file
+from sim.store.own_files import refuse_foreign_file
+from sim.store.tables import json_document, plain, table_bytes
 from sim.types import Array, DetectionMode
 from tracking.app import option_parsing
 from tracking.app.command_options import StressOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import checked_key, figure, table
 from tracking.app.progress import ProgressMeter
+from tracking.app.score_tables import checked_key, figure, table
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import FEWEST, mean_interval
 from tracking.stress.axes import Axis, BreakingPoint, parse_axes, shares

@@ -61,7 +61,7 @@ class TrackerSetup:
 
 def track(options: TrackOptions) -> CommandResult:
     """Tracks every sequence of the source and stores the tracks; returns a line for each run."""
-    from sim.io.files.atomic import lock_folder
+    from sim.store.atomic import lock_folder
 
     setup = _setup(options)
     needs = find(setup.tracker).needs
@@ -96,7 +96,7 @@ def _step(meter: ProgressMeter, name: str, _: int) -> None:
 def _track_sequence(
     setup: TrackerSetup, sequence: Sequence, folder: Path, progress: Callable[[int], None] | None = None
 ) -> dict[str, Any]:
-    from sim.io.store.seal import tracked_hash
+    from sim.store.seal import tracked_hash
 
     tracked_hash(sequence)  # labels that cannot be read are refused now, not after the last frame
     run = setup.run(sequence, progress)

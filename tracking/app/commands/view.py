@@ -8,13 +8,13 @@ from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from scenarios.errors import InputError, counted
-from sim.io.files.own_files import address, output_file, output_paths, refuse_foreign_file
+from sim.store.own_files import address, output_file, output_paths, refuse_foreign_file
 from sim.types import Sequence
 from tracking.app.command_options import OverlayOptions, SheetOptions, ViewOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.score_tables import checked_key
-from tracking.app.commands.scored_sequence import read_runs, run_names, scale_of_texts, scoring_jobs
 from tracking.app.progress import ProgressMeter, total_frames
+from tracking.app.score_tables import checked_key
+from tracking.app.scored_sequence import read_runs, run_names, scale_of_texts, scoring_jobs
 from tracking.app.sequence_workers import source_of
 from tracking.app.stored_tracks import find_tracks, match_tracks
 

@@ -14,8 +14,8 @@ import cv2
 import numpy as np
 
 from scenarios.errors import InputError, counted
-from sim.io.files.atomic import write_file
-from sim.io.files.own_files import marked_png
+from sim.store.atomic import write_file
+from sim.store.own_files import marked_png
 from sim.types import Array, Image, Ints, Scene, Sequence, Tracks
 from tracking.drawing.canvas import FLOOR, INK, QUIET, THING, TRAIL_SECONDS, Canvas, text, text_width
 from tracking.drawing.layer_painting import KIND_COLOUR, event_words, kind_colour, paint_layer

@@ -13,9 +13,9 @@ import cv2
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.files.atomic import new_file
-from sim.io.files.own_files import GENERATOR
-from sim.io.pictures.video_files import write_video
+from sim.pictures.video_files import write_video
+from sim.store.atomic import new_file
+from sim.store.own_files import GENERATOR
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app.replay_page.video import even_size, refuse_source, shown_pictures
 from tracking.drawing.canvas import FLOOR, Canvas, colour, text

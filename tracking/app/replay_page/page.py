@@ -16,9 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
-from sim.io.files.atomic import write_file
-from sim.io.files.tables import plain
-from sim.io.store.truth_files import spans
+from sim.store.atomic import write_file
+from sim.store.tables import plain
+from sim.store.truth_files import spans
 from sim.types import Array, GroupEvent, Sequence, Tracks
 from tracking.app.replay_page.page_rows import SCALE, Json, PageRows, deltas, encode_rows, rows_of_tracks, rows_of_truth
 from tracking.app.replay_page.video import PageVideo

@@ -18,8 +18,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.io.formats.labelled_truth import centres
-from sim.io.store.track_files import flatten
+from sim.geometry.boxes import centres
+from sim.store.track_files import flatten
 from sim.types import Array, Bools, GroupEvent, Groups, Ints, Tracks, Truth
 
 

@@ -12,9 +12,9 @@ from typing import Any, Literal
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.io.files.atomic import staged_path
-from sim.io.files.own_files import GENERATOR, address, refuse_foreign_file
-from sim.io.pictures.video_files import rate_of, write_video
+from sim.pictures.video_files import rate_of, write_video
+from sim.store.atomic import staged_path
+from sim.store.own_files import GENERATOR, address, refuse_foreign_file
 from sim.types import Frame, Image, Sequence
 
 VideoPlacement = Literal["auto", "inside", "beside", "none"]

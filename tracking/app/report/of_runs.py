@@ -9,12 +9,12 @@ from dataclasses import dataclass, replace
 
 from scenarios.errors import counted
 from sim.types import Sequence
-from tracking.app.commands.score_ranking import RankedRuns, rank_words, ranked_runs, verdict
-from tracking.app.commands.score_tables import SIMILARITY
-from tracking.app.commands.scored_sequence import ScoringJob, read_runs, score_runs, scoring_jobs
 from tracking.app.replay_page.page import Run
 from tracking.app.report.content import Played, Report, heat_map
 from tracking.app.report.moments import COSTS, cause_rows, moments, shown_errors
+from tracking.app.score_ranking import RankedRuns, rank_words, ranked_runs, verdict
+from tracking.app.score_tables import SIMILARITY
+from tracking.app.scored_sequence import ScoringJob, read_runs, score_runs, scoring_jobs
 from tracking.app.sequence_workers import OpenedAs, over_sequences
 from tracking.comparison import ComparedSequence
 from tracking.errors.found import RunErrors

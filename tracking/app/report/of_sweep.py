@@ -13,18 +13,18 @@ import numpy as np
 from scenarios.errors import counted
 from scenarios.loading.resolve import SuiteEntry, rows
 from sim.types import Array, Sequence
-from tracking.app.commands.score_ranking import rank_words
 from tracking.app.replay_page.page import Run
 from tracking.app.report.content import Curves, HeatCell, HeatMap, Json, Played, Report, heat_map
 from tracking.app.report.moments import COSTS, cause_rows, moments, shown_errors
-from tracking.environment.episodes import streams_for
+from tracking.app.score_ranking import rank_words
+from tracking.episodes.episode import streams_for
+from tracking.episodes.parallel_episodes import opened_sources
 from tracking.errors.found import RunErrors
 from tracking.ranking import rank
 from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import mean_interval, mean_of_finite
 from tracking.stress.sweep import Scene, Sweep, generate_command
-from tracking.tuning.parallel_episodes import opened_sources
 
 CAUSES = "What the repair of the errors of one kind and cause adds, mean over the sequences of the worst moments."
 

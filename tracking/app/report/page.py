@@ -8,11 +8,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from scenarios.errors import InputError
-from sim.io.files.atomic import write_file
-from sim.io.files.own_files import GENERATOR
-from tracking.app.commands.score_tables import number
+from sim.store.atomic import write_file
+from sim.store.own_files import GENERATOR
 from tracking.app.replay_page.page import page_html, script_json, theme
 from tracking.app.report.content import Report
+from tracking.app.score_tables import number
 from tracking.scoring.catalogue import CATALOGUE
 
 if TYPE_CHECKING:

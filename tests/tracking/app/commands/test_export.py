@@ -9,11 +9,11 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from sim.io.source import open_source
-from sim.io.store.track_files import read_tracks
 from tests.refusals import answer
 from tests.short_scene import write_short_scene
 from tracking.app.cli import run
+from tracking.recordings.source import open_source
+from tracking.recordings.track_texts import read_tracks
 
 
 @pytest.fixture(scope="module")

@@ -12,11 +12,10 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
-from sim.io.files.tables import plain
-from sim.io.source import open_source
-from sim.io.store.seal import NAMES, check_run
-from sim.io.store.track_files import read_tracks, write_tracks
 from sim.sequence import simulate
+from sim.store.seal import NAMES, check_run
+from sim.store.tables import plain
+from sim.store.track_files import write_tracks
 from sim.types import Tracks
 from tests.recordings import mot_folder
 from tests.refusals import answer, refused
@@ -25,6 +24,8 @@ from tests.short_scene import write_short_scene
 from tracking import group
 from tracking.app.cli import run
 from tracking.app.commands.group import lasting
+from tracking.recordings.source import open_source
+from tracking.recordings.track_texts import read_tracks
 
 FPS = 10.0
 Place = Callable[[float], tuple[float, float]]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from scenarios.loading.resolve import load
-from sim.io.store.track_files import write_tracks
 from sim.sequence import simulate
+from sim.store.track_files import write_tracks
 from sim.types import Sequence
 from tests.groups_as_wholes import wholes
 from tests.refusals import answer, refused

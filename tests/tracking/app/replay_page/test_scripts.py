@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 import tracking.app.replay_page
-from sim.io.files.tables import plain
-from sim.io.store.truth_files import with_ground_height
 from sim.scene.camera import camera_rotation, project
+from sim.store.tables import plain
+from sim.store.truth_files import with_ground_height
 from sim.types import Camera, Scene, Sequence, Stairs
 from tests.groups_as_wholes import wholes
 from tracking.app.replay_page.page import Run, page_data

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from sim.io.source import open_source
 from tests.coded_pictures import SIZE, number, sequence
 from tracking.app.replay_page.page import write_page
 from tracking.app.replay_page.video import PageVideo, page_video
+from tracking.recordings.source import open_source
 
 
 def shown(made: PageVideo, folder: Path) -> list[tuple[float, int]]:

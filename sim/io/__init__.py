@@ -1,1 +1,0 @@
-"""Reading and writing sequences: recordings in public formats, our own store, exports."""

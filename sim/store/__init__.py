@@ -1,0 +1,1 @@
+"""The files of flockscope: stored sequences, truth, tracks and groups, with hashes that seal them."""

@@ -1,0 +1,81 @@
+"""camera.json and scene.json: a Camera and a Scene (the static world) as JSON, read back equal to the last bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, Field
+
+from scenarios.errors import InputError
+from sim.scene.camera import require_camera
+from sim.store import tables
+from sim.store.tables import Number, Pair, Triple, validated
+from sim.types import Camera, Scene
+
+Pixels = Annotated[float, Field(strict=True, multiple_of=1)]
+
+
+def camera_document(camera: Camera) -> dict[str, Any]:
+    """Returns the content of camera.json: the fields of Camera; rotation is world to camera."""
+    document = {"format": tables.FORMAT, **tables.plain(camera)}
+    if not camera.radial:
+        del document["radial"]
+    return document
+
+
+class _Camera(BaseModel):
+    kind: Literal["pinhole", "top"]
+    image: tuple[Pixels, Pixels]
+    focal_px: Pair
+    centre_px: Pair
+    position: Triple
+    rotation: tuple[Triple, Triple, Triple]
+    baseline: Number = 0.0
+    px_per_m: Number | None = None
+    radial: Number = 0.0
+
+
+def read_camera(path: Path) -> Camera:
+    """Returns the Camera in a camera.json; missing baseline and radial are 0, a missing px_per_m is nan."""
+    found = validated(path, tables.read_document(path, "give a camera.json"), _Camera, "correct it")
+    if found.px_per_m is None and found.kind == "top":
+        raise InputError(file=path, place="px_per_m", got="null", expected="a scale for kind top", remedy="add it")
+    camera = Camera(
+        found.kind, (int(found.image[0]), int(found.image[1])), found.focal_px, found.centre_px,
+        np.array(found.position), np.array(found.rotation), found.baseline, tables.none_to_nan(found.px_per_m),
+        found.radial,
+    )  # fmt: skip
+    return require_camera(camera, path)
+
+
+def scene_document(scene: Scene) -> dict[str, Any]:
+    """Returns the content of scene.json, all lengths in m: the fields of Scene as lists."""
+    return {"format": tables.FORMAT, **tables.plain(scene)}
+
+
+class _Stairs(BaseModel):
+    foot: Pair
+    head: Pair
+    width: Number
+    rise: Number
+    steps: Number
+    landing: Number
+
+
+class _Scene(BaseModel):
+    size: Pair
+    walls: list[tuple[Pair, Pair]]
+    pillars: list[Triple]
+    doors: list[tuple[Pair, Pair]]
+    service: list[Pair]
+    stairs: list[_Stairs]
+    wall_height: Number
+    pillar_height: Number
+
+
+def read_scene(path: Path) -> Scene:
+    """Returns the Scene in a scene.json."""
+    found = validated(path, tables.read_document(path), _Scene, "correct it")
+    return Scene.of(found, found.walls, found.doors)

@@ -1,0 +1,50 @@
+"""Velocities of people from their positions, by differences over a window of time (default 0.5 s).
+
+`differentiate` is for labels, and looks half the window ahead. `chords` is for tracks, and looks back only. The unit is
+that of the positions per second.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.truth.merge_split_rules import frames_of
+from sim.types import Array, Ints
+
+WINDOW = 0.5  # s, length of the time window
+# s, that of labelled boxes: they rest for some frames and then jump by pixels, which shorter windows pick up
+CHORD = 1.0
+
+
+def differentiate(frame: Ints, id: Ints, pos: Array, fps: float, window: float = WINDOW) -> Array:
+    """Returns the velocity of each row (R, D), in the unit of `pos` per s: a difference over a centred window.
+
+    frame, id (R,), pos (R, D): rows in any order, each id once in a frame. window: s. The velocity is 0 if an id
+    has only one row in the window, nan if a position used is nan.
+    """
+    half = max(1, round(window * fps / 2))
+    return _chords(frame, id, pos, fps, half, half, 0.0)
+
+
+def chords(frame: Ints, id: Ints, pos: Array, fps: float, window: float = WINDOW) -> Array:
+    """Returns the velocity of each row (R, D): displacement since the id's earliest row in the last `window` s, over
+    time.
+
+    frame, id (R,), pos (R, D): rows in any order, each id once in a frame. nan without an earlier row within the
+    window.
+    """
+    return _chords(frame, id, pos, fps, frames_of(window, fps), 0, np.nan)
+
+
+def _chords(frame: Ints, id: Ints, pos: Array, fps: float, back: int, ahead: int, alone: float) -> Array:
+    """Returns the velocities from the id's first to its last row within `back` and `ahead` frames of each row."""
+    order = np.lexsort((frame, id))
+    f, rank = frame[order], np.unique(id[order], return_inverse=True)[1]
+    # Keys of two people are further apart than a window, so one search serves all.
+    key = rank * (int(f.max(initial=0)) + back + ahead + 2) + f
+    first, last = np.searchsorted(key, key - back), np.searchsorted(key, key + ahead, side="right") - 1
+    steps = f[last] - f[first]
+    chord = (pos[order][last] - pos[order][first]) * fps / np.maximum(steps, 1)[:, None]
+    out = np.empty_like(pos)
+    out[order] = np.where(steps[:, None] > 0, chord, alone)
+    return out

@@ -1,0 +1,120 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from scenarios.errors import InputError
+from sim.store import sequence_folder
+from sim.store.validate import content_hash
+from tests.made_up import make_pictured, make_sequence
+from tests.recordings import mot_folder
+from tracking.export.coco import coco
+
+
+def test_coco_has_every_box(tmp_path):
+    for k, name in enumerate(("a", "b")):
+        live = replace(make_sequence(k), name=name)
+        sequence_folder.write_sequence(tmp_path / "data" / name, live, scenario="schema = 1\n", seed=k)
+    coco(tmp_path / "data", tmp_path / "coco.json")
+    first = (tmp_path / "coco.json").read_bytes()
+    coco(tmp_path / "data", tmp_path / "coco.json")
+    assert (tmp_path / "coco.json").read_bytes() == first
+    found = json.loads(first)
+    truths = [make_sequence(k).truth for k in (0, 1)]
+    assert [c["name"] for c in found["categories"]] == ["person"]
+    assert found["info"]["content_hash"] == content_hash(tmp_path / "data")
+    assert [i["id"] for i in found["images"]] == list(range(1, 25))
+    seen = [((t.box[:, :2] < (640, 480)) & (t.box[:, :2] + t.box[:, 2:] > 0)).all(axis=1) for t in truths]
+    assert [a["id"] for a in found["annotations"]] == list(range(1, sum(map(sum, seen)) + 1))
+    rows = [(a["track_id"], a["group_id"]) for a in found["annotations"]]
+    assert rows == [pair for t, s in zip(truths, seen, strict=True) for pair in zip(t.id[s], t.group[s], strict=True)]
+    images = {i["id"]: i for i in found["images"]}
+    for a in found["annotations"]:
+        image = images[a["image_id"]]
+        assert image["video_id"] == a["video_id"]
+        t = truths[a["video_id"] - 1]
+        row = t.rows(image["frame"]).start + t.id[t.rows(image["frame"])].tolist().index(a["track_id"])
+        assert a["bbox"] == pytest.approx(t.box[row].tolist(), abs=0.006)
+        assert a["area"] == pytest.approx(a["bbox"][2] * a["bbox"][3], abs=0.006)
+    assert images[1]["width"] == 640
+
+
+def stored(folder, sequence, seed=1, **options):
+    return sequence_folder.write_sequence(folder, sequence, scenario="schema = 1\n", seed=seed, **options)
+
+
+def labelled_folder(path, rows, *, pictures=(), ini=""):
+    """A MOTChallenge folder; pictures: names below it, of 64 × 48 px."""
+    shown = dict.fromkeys(pictures, np.zeros((48, 64, 3), np.uint8))
+    mot_folder(path, "\n".join(rows), ini=f"name={path.name}\nframeRate=5\n{ini}", pictures=shown)
+
+
+def test_several_splits_are_refused(tmp_path):
+    """By the seeds of generated sequences, wherever they lie."""
+    for seed in (1, 2, 20_001):
+        stored(tmp_path / f"data/mixed/s{seed}", replace(make_sequence(seed), name=f"s{seed}"), seed)
+    with pytest.raises(InputError, match=r"the splits test, train; .*/data/mixed"):
+        coco(tmp_path / "data", tmp_path / "all.json")
+    assert not (tmp_path / "all.json").exists()
+
+
+def test_names_of_pictures_of_recordings_resolve(tmp_path):
+    """Another folder and file type than usual, numbers from 0; a frame without a picture is no image."""
+    pictures = [f"frames/frame_{k:04d}.png" for k in (0, 1, 3)]
+    rows = [f"{k},1,{5 * k},5,9,9,1,1,1" for k in (1, 2, 3, 4)]
+    labelled_folder(tmp_path / "set/s", rows, pictures=pictures, ini="imDir=frames\nimExt=.png\nseqLength=4\n")
+    for source in (tmp_path / "set", tmp_path / "set/s"):
+        with pytest.warns(UserWarning, match="pictures 0 to 3 are taken as frames 1 to 4"):
+            path = coco(source, tmp_path / "out/c.json")
+        found = json.loads(path.read_text())
+        root = path.parent / found["info"]["root"]
+        assert root.resolve() == source
+        assert [(root / i["file_name"]).name for i in found["images"]] == [name.split("/")[1] for name in pictures]
+        assert all((root / i["file_name"]).is_file() for i in found["images"])
+        assert [(a["image_id"], a["bbox"][0]) for a in found["annotations"]] == [(1, 5), (2, 10), (3, 20)]
+        assert [i["frame"] for i in found["images"]] == [1, 2, 4]
+        assert found["images"][0]["width"] == 64
+
+
+@pytest.mark.filterwarnings("ignore:.*1 pictures? beyond frame 2")
+def test_pictures_after_the_last_frame_are_no_images(tmp_path):
+    pictures = [f"img1/{k:06d}.png" for k in (1, 2, 3)]
+    labelled_folder(tmp_path / "s", ["1,1,5,5,9,9,1,1,1"], pictures=pictures, ini="seqLength=2\n")
+    path = coco(tmp_path / "s", tmp_path / "c.json")
+    assert [i["frame"] for i in json.loads(path.read_text())["images"]] == [1, 2]
+
+
+def test_people_outside_the_picture_are_left_out(tmp_path):
+    rows = [
+        "1,1,-20,5,20,9,1,1,1", "1,2,64,5,9,9,1,1,1", "1,3,5,48,9,9,1,1,1", "1,4,5,-30,9,29,1,1,1",
+        "1,5,-4,40,10,20,1,1,0.3", "1,6,10,10,5,5,1,1,0.1",
+    ]  # fmt: skip
+    labelled_folder(tmp_path / "s", rows, ini="imWidth=64\nimHeight=48\n")
+    path = coco(tmp_path / "s", tmp_path / "c.json")
+    found = json.loads(path.read_text())["annotations"]
+    assert [a["track_id"] for a in found] == [5, 6]
+    assert found[0]["bbox"] == [-4, 40, 10, 20], "amodal and unclipped, as in gt.txt"
+    assert found[0]["segmentation"] == [[0, 40, 6, 40, 6, 48, 0, 48]], "the part inside the picture"
+
+
+def decoded(segmentation):
+    """The mask of uncompressed run lengths as COCO defines them: down the columns, zeros first."""
+    height, width = segmentation["size"]
+    counts = segmentation["counts"]
+    flat = np.repeat(np.arange(len(counts)) % 2, counts)
+    assert len(flat) == height * width
+    return flat.reshape(width, height).T.astype(bool)
+
+
+def test_masks_are_the_visible_pixels(tmp_path):
+    live = make_pictured(1, ("left", "ids"))
+    stored(tmp_path / live.name, live, streams=("left", "ids"))
+    path = coco(tmp_path / live.name, tmp_path / "c.json")
+    found = json.loads(path.read_text())
+    frames = {i["id"]: i["frame"] for i in found["images"]}
+    assert any(a["area"] > 0 for a in found["annotations"])
+    for a in found["annotations"]:
+        right = live.load_pixels(frames[a["image_id"]]).ids == a["track_id"]
+        assert np.array_equal(decoded(a["segmentation"]), right)
+        assert a["area"] == right.sum()

@@ -1,0 +1,81 @@
+"""KITTI export: stereo pairs, true disparities and calibration of generated sequences, named as in KITTI's data.
+
+OUT/<split>/<name>/ of a sequence holds image_2 (left) and image_3 (right), 8-bit PNG; disp_noc_0, 16-bit PNG of 256
+times the disparity in px, 0 where it is unknown or the right camera does not see the point; times.txt, the time of each
+frame in s; and calib.txt. Pictures are named for the frame, from 000001.png.
+
+calib.txt has the matrices of KITTI's calibrations row by row, so that tools for its odometry and its object data read
+it. P0 to P3 (3 x 4) project points of the left camera's coordinates: there are no grey cameras, so P0 and P2 are the
+left picture, P1 and P3 the right one. The world takes the place of the laser scanner and of the IMU: Tr and
+Tr_velo_to_cam (3 x 4) map it to the left camera, Tr_imu_to_velo (3 x 4) and R0_rect (3 x 3) are identities.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import cv2
+import numpy as np
+
+from scenarios.errors import InputError
+from sim.pictures.stored_pictures import StoredPictures
+from sim.store.atomic import write_file
+from sim.store.camera_files import read_camera
+from sim.store.own_files import split_and_name
+from sim.store.seal import read_whole_manifest, reject_sealed
+from sim.types import Camera
+from tracking.recordings.source import generated_folders
+
+FOLDERS = {"left": "image_2", "right": "image_3", "disparity": "disp_noc_0"}
+
+
+def kitti(source: str | Path, out: str | Path) -> list[Path]:
+    """Writes the pairs, disparities and calibrations of a generated dataset in KITTI's layout.
+
+    Args:
+        source: A sequence or dataset with the streams left and right; disparities are written where stored.
+        out: The folder; files of an earlier export are replaced.
+
+    Returns:
+        The folders of the sequences.
+
+    Raises:
+        InputError: Two sequences share a folder, or it is that of a stored sequence or a run.
+    """
+    folders = generated_folders(Path(source))
+    targets = [Path(out) / split_and_name(folder) for folder in folders]
+    if len(set(targets)) < len(targets):
+        raise InputError(file=source, got="two sequences of one name", expected="unique names", remedy="rename one")
+    for folder, target in zip(folders, targets, strict=True):
+        reject_sealed(target)
+        _export(folder, target)
+    return targets
+
+
+def calibration(camera: Camera) -> str:
+    """Returns the text of calib.txt for a rectified pair. camera: the left camera, with its baseline."""
+    (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
+    left = np.array([[fx, 0, cx - 0.5, 0], [0, fy, cy - 0.5, 0], [0, 0, 1, 0]])  # KITTI: a pixel's centre is a whole px
+    right = left.copy()
+    right[0, 3] = -fx * camera.baseline
+    pose = np.column_stack([camera.rotation, -camera.rotation @ camera.position])
+    lines = {"P0": left, "P1": right, "P2": left, "P3": right, "R0_rect": np.eye(3), "Tr_velo_to_cam": pose}
+    lines |= {"Tr_imu_to_velo": np.eye(3, 4), "Tr": pose}
+    cells = {name: " ".join(f"{v:.12e}" for v in matrix.ravel().tolist()) for name, matrix in lines.items()}
+    return "".join(f"{name}: {numbers}\n" for name, numbers in cells.items())
+
+
+def _export(folder: Path, target: Path) -> None:
+    stored = StoredPictures(folder, read_whole_manifest(folder))
+    missing = [name for name in ("left", "right") if name not in stored.streams]
+    if missing:
+        remedy = "generate it with --streams left,right,disparity"
+        raise InputError(file=folder, got=f"no stream {' or '.join(missing)}", expected="left and right", remedy=remedy)
+    write_file(target / "calib.txt", calibration(read_camera(folder / "camera.json")).encode())
+    about = stored.manifest["sequence"]
+    times = "".join(f"{k / about['fps']:.6e}\n" for k in range(about["length"]))
+    write_file(target / "times.txt", times.encode())
+    for stream, name in FOLDERS.items():
+        if stream in stored.streams:
+            for k, picture in enumerate(stored.all(stream, about["length"]), 1):
+                write_file(target / name / f"{k:06d}.png", cv2.imencode(".png", picture)[1].tobytes())

@@ -1,0 +1,136 @@
+"""WebDataset export: packs stored sequences into tar shards that the library webdataset streams.
+
+A sample is a whole sequence: all its files, hence its content hash. They share a key and stand next to each other. The
+same dataset gives the same bytes: members are sorted by sequence and have no times or owners. index.json lists all
+shards. The files appear when all are complete, index.json last.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import tarfile
+from collections.abc import Callable, Iterator
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from scenarios.errors import InputError
+from sim import hashing
+from sim.pictures.stored_pictures import StoredPictures
+from sim.store import tables
+from sim.store.atomic import lock_folder, remove_partials, staged_path, write_file
+from sim.store.own_files import is_side_file, split_and_name
+from sim.store.seal import MANIFEST, read_whole_manifest
+from tracking.recordings.source import generated_folders
+
+BLOCK = 512  # bytes: a tar holds whole blocks
+UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
+INDEX = "index.json"
+
+Progress = Callable[[int, int, str], None]
+
+
+def webdataset(
+    source: str | Path, out: str | Path, *, shard_size: int = 10**9, progress: Progress | None = None
+) -> dict[str, Any]:
+    """Packs a generated dataset into OUT/shard-000000.tar, …, and writes OUT/index.json.
+
+    Args:
+        source: A generated sequence or dataset.
+        out: The folder; it must be missing, empty, or hold the same export.
+        shard_size: Bytes that a shard may have. A sequence is never divided, so a shard of one sequence may be larger.
+        progress: Called as progress(shards done, shards in all, name of the last one) after each shard.
+
+    Returns:
+        The index: format, content_hash, and of each shard name, sequences (content hashes by name), bytes and sha256.
+    """
+    root, shards, done = Path(out), _shards(Path(source), shard_size), list[dict[str, Any]]()
+    hashes = {split_and_name(p): content for some in shards for p, content in some.items()}
+    content = hashing.dataset_hash(hashes)
+    with lock_folder(root):
+        remove_partials(root)
+        _reject_others(root, content, len(shards))
+        # Inside the folder, which may be a link, a mount or the current one.
+        with staged_path(root / INDEX) as partial:
+            partial.mkdir()
+            for number, some in enumerate(shards):
+                done.append(_write_shard(partial / _name(number), some))
+                if progress is not None:
+                    progress(len(done), len(shards), done[-1]["name"])
+            index = {"format": tables.FORMAT, "content_hash": content, "shards": done}
+            (root / INDEX).unlink(missing_ok=True)
+            for facts in done:
+                os.replace(partial / facts["name"], root / facts["name"])
+            write_file(root / INDEX, tables.json_document(index))
+    return index
+
+
+def _name(number: int) -> str:
+    return f"shard-{number:06d}.tar"
+
+
+def _reject_others(root: Path, content: str, count: int) -> None:
+    """Raises InputError if the folder holds anything but the same export."""
+    found = {path.name for path in root.iterdir() if not is_side_file(path.name)}
+    stored = tables.read_json(root / INDEX).get("content_hash") if INDEX in found else None
+    if found and not (stored == content and found == {INDEX, *map(_name, range(count))}):
+        got, remedy = "other files, or another export", "choose another --out, or delete that folder"
+        raise InputError(file=root, got=got, expected="this dataset in shards of this size, or nothing", remedy=remedy)
+
+
+def size_of(text: str) -> int:
+    """Returns the number of bytes that a text such as `500MB`, `1.5 GB` or `3 kB` means; units are powers of 1000."""
+    found = re.fullmatch(r"([0-9]{1,12}(?:\.[0-9]{1,6})?)\s*(?:([kMG])?B)?", text.strip())
+    size = 0 if found is None else round(float(found[1]) * UNITS[found[2] or ""])
+    if size < 1:
+        expected = "bytes, kB, MB or GB above 0"
+        raise InputError(place="--shard-size", got=repr(text), expected=expected, remedy="write 500MB")
+    return size
+
+
+def _shards(source: Path, size: int) -> list[dict[Path, str]]:
+    """Returns the content hash of each sequence folder of each shard, as many as fit into a tar of `size` bytes."""
+    folders = sorted(generated_folders(source), key=split_and_name)
+    twice = next((a for a, b in pairwise(map(split_and_name, folders)) if a == b), None)
+    if twice is not None:
+        raise InputError(file=source, got=f"two sequences {twice}", expected="unique names", remedy="export them apart")
+    shards: list[dict[Path, str]] = []
+    full = size
+    for folder in folders:
+        manifest = read_whole_manifest(folder)  # not kept: those of a large dataset would fill the memory
+        sizes = {MANIFEST: (folder / MANIFEST).stat().st_size}
+        sizes |= {name: facts["bytes"] for name, facts in manifest["files"].items()}
+        # A header before each file, and two more blocks with its name if that is long.
+        long = sum(len(f"{_key(folder)}.{name}".encode()) > tarfile.LENGTH_NAME for name in sizes)
+        more = BLOCK * (len(sizes) + 2 * long + sum(-(-count // BLOCK) for count in sizes.values()))
+        if full + more > size:
+            shards.append({})
+            full = 2 * BLOCK + tarfile.RECORDSIZE  # the end of a tar, at most
+        shards[-1][folder] = manifest["content_hash"]
+        full += more
+    return shards
+
+
+def _key(folder: Path) -> str:
+    return split_and_name(folder).replace(".", "%2E")  # webdataset ends a key at its first dot
+
+
+def _write_shard(path: Path, some: dict[Path, str]) -> dict[str, Any]:
+    with tarfile.open(path, "w", format=tarfile.GNU_FORMAT) as tar:
+        for name, body in (member for folder in some for member in _members(folder)):
+            info = tarfile.TarInfo(name)
+            info.size = len(body)
+            tar.addfile(info, io.BytesIO(body))
+    sequences = {split_and_name(folder): content for folder, content in some.items()}
+    facts = {"name": path.name, "sequences": sequences, "bytes": path.stat().st_size}
+    return {**facts, "sha256": hashing.file_hash(path)}
+
+
+def _members(folder: Path) -> Iterator[tuple[str, bytes]]:
+    """Yields name and content of each file of a sequence as it stands in the tar, the manifest first."""
+    stored = StoredPictures(folder, read_whole_manifest(folder))
+    yield f"{_key(folder)}.{MANIFEST}", (folder / MANIFEST).read_bytes()
+    for name in stored.manifest["files"]:
+        yield f"{_key(folder)}.{name.replace('/', '.')}", stored.body(name)
