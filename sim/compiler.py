@@ -4,9 +4,6 @@ numba caches compiled kernels beside their files or in the user's cache folder. 
 and numba then refuses to compile. The cache goes to a temporary folder of the user in that case, or is left out. numba
 looks at the file of a kernel alone; here, a change of its options, of this module or of what it imports makes it
 compile anew, too.
-
-A function whose name begins with an underscore is called by kernels only: it has neither a wrapper for calls from
-Python nor a cache, which takes time to make.
 """
 
 from __future__ import annotations
@@ -44,40 +41,40 @@ def cached_njit(**options: Any) -> Callable[[Any], Any]:
     options = {"error_model": "numpy", "no_cfunc_wrapper": True, **options}
 
     def compiled(function: Any) -> Any:
-        inner = function.__name__.startswith("_")
-        chosen = {**options, "cache": options.get("cache", False) and not inner, "no_cpython_wrapper": inner}
-        if chosen["cache"] and not config.CACHE_DIR:
-            if not _numba_finds_a_place(os.path.dirname(function.__code__.co_filename)):
-                config.CACHE_DIR = temporary_cache() or ""
+        if not options.get("cache"):
+            return numba.njit(**options)(function)
+        if not config.CACHE_DIR and not _numba_finds_a_place(os.path.dirname(function.__code__.co_filename)):
+            config.CACHE_DIR = temporary_cache() or ""
         try:
-            kernel = numba.njit(**chosen)(function)
+            kernel = numba.njit(**options)(function)
         except RuntimeError as error:
             if "cannot cache function" not in str(error):
                 raise
             _warn_once()
-            return numba.njit(**{**chosen, "cache": False})(function)
-        kernel.made_of = _made_of(function, chosen)
-        stored = getattr(getattr(kernel, "_cache", None), "_cache_file", None)
-        if stored:
-            stored._source_stamp = kernel.made_of
+            return numba.njit(**{**options, "cache": False})(function)
+        stored = _stored(kernel)
+        stored._source_stamp = (stored._source_stamp, _used_by(function), OWN, repr(sorted(options.items())))
         return kernel
 
     return compiled
 
 
-def _made_of(function: Any, options: dict[str, Any]) -> str:
-    file = Path(function.__code__.co_filename)
-    facts = file.stat() if file.exists() else None
-    made = hashlib.sha256(repr((OWN, sorted(options.items()), facts and (facts.st_mtime_ns, facts.st_size))).encode())
+def _stored(kernel: Any) -> Any:
+    return getattr(getattr(kernel, "_cache", None), "_cache_file", None)
+
+
+def _used_by(function: Any) -> str:
+    used = hashlib.sha256()
     for name, value in sorted(function.__globals__.items()):
-        if hasattr(value, "made_of") and value.__module__ != function.__module__:
-            value = value.made_of
+        stored = _stored(value)
+        if stored and value.__module__ != function.__module__:
+            value = stored._source_stamp
         elif isinstance(value, np.ndarray):
             value = value.tobytes()
         elif not isinstance(value, bool | int | float | tuple | np.generic):
             continue
-        made.update(f"{name} {value!r}\n".encode())
-    return made.hexdigest()
+        used.update(f"{name} {value!r}\n".encode())
+    return used.hexdigest()
 
 
 class _Compiling(event.Listener):

@@ -114,9 +114,9 @@ from sim.compiler import njit
 from used import FACTOR, term
 @njit(cache=True)
 def user(x):
-    return _later(x)
+    return later(x)
 @njit(cache=True)
-def _later(x):
+def later(x):
     return FACTOR * term(x)
 if __name__ == "__main__":
     print(user(1), len(user.stats.cache_hits))

@@ -211,9 +211,7 @@ def remember(
         bank.members[row] = MemberPlaces(*map(np.concatenate, parts))
 
 
-def _hidden_members(
-    bank: GroupBank, rows: list[int], points: Array, scaled: ScaledParameters, t: float
-) -> list[Bools]:
+def _hidden_members(bank: GroupBank, rows: list[int], points: Array, scaled: ScaledParameters, t: float) -> list[Bools]:
     c, (place, row, last_seen, known) = scaled.config, bank.members_of(rows)
     age = t - last_seen
     hidden = known & (age > c.carry_time + 1e-9) & (age <= c.coast_time + 1e-9)

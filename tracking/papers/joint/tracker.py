@@ -28,10 +28,9 @@ from tracking.papers.joint.distributions import (
     RESAMPLING,
     STATE,
     FrameModel,
-    moved,
-    process_noise,
 )
 from tracking.papers.joint.division_kernels import place_newcomers
+from tracking.papers.joint.individuals import moved, process_noise
 from tracking.papers.joint.people import Newcomers, People, associate
 from tracking.papers.joint.report import OWN_EVENTS, ReportedEvents
 

@@ -4,7 +4,7 @@ Each person has weights of the own and is resampled alone, so that the weights o
 one particle; the posterior is taken for a product over people (ours). In the paper's filter a particle has one weight.
 
 The relation "walking together" is kept for the pairs only that walk together in some particle, so that the cost is that
-of the neighbours. Here is also which people may start to walk together, and the relations of new people (sec. 3.2). The
+of the neighbours. `near_pairs` and `join` choose the pairs (sec. 3.2). The
 groups of a particle are the connected components of its related pairs. `transition_kernels` moves people and changes
 relations. Arrays are over P particles and K people.
 """
@@ -214,5 +214,5 @@ def join(pos: Array, exist: Array, label: Ints, points: Array, uniforms: Array, 
     new, near = new[near < old + new], near[near < old + new]
     near, start = near[np.argsort(new, kind="stable")], np.searchsorted(np.sort(new), np.arange(len(points) + 1))
     ever = transition_kernels.join(pos, exist, label, points, near, start, uniforms, rules)
-    pairs = np.ascontiguousarray(np.argwhere(ever)[:, ::-1]) + [0, old]
+    pairs = np.ascontiguousarray(np.argwhere(ever)[:, ::-1]) + np.array([0, old])
     return pairs, transition_kernels.same_group(label, pairs)

@@ -153,8 +153,9 @@ def relate(
 def join(
     pos: Array, exist: Array, label: Ints, points: Array, near: Ints, start: Ints, uniforms: Array, rules: Array
 ) -> Bools:
-    """Writes the groups label[:, new] of M new people, the last ones, in each particle, one after the other, and returns
-    with which people before them each is in one group in some particle, (M, K).
+    """Writes the groups label[:, new] of M new people, the last ones, in each particle, one after the other.
+
+    Returns with which people before them each is in one group in some particle, (M, K).
 
     Arguments as of `particle_set.join`; near: who is near, all before the new person, ascending; those of person m are
     near[start[m] : start[m + 1]], start (M + 1,).
