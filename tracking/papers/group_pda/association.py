@@ -181,7 +181,8 @@ def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: 
     (s)."""
     c = scaled.config
     place, row, last_seen, known = bank.members_of(range(len(bank)))
-    late = known & (t - last_seen <= c.carry_time + 1e-9) & (c.carry_time > 0 and not scaled.from_pixels)
+    late = known & (t - last_seen <= c.carry_time + 1e-9)
+    late &= c.carry_time > 0 and not scaled.from_pixels
     late[late] = ~any_within(place[late], points, scaled.scale * c.carry_reach)
     return place[late], row[late], last_seen[late]
 

@@ -79,8 +79,12 @@ class ParticleSet:
     def together(self) -> Array:
         """Returns the probability (K, K) that two people walk together, given that both exist; 1 on the diagonal, 0 for
         a pair that does not exist."""
-        (i, j), out = self.pairs.T, np.eye(self.people)
-        share = particle_set_kernels.shares(self.pairs, self.related, self.weights, self.exist, self.one_weight)
+        i, j = self.pairs.T
+        both = (
+            self.weights[:, j] * self.exist[:, i] * self.exist[:, j] * (1.0 if self.one_weight else self.weights[:, i])
+        )
+        total, out = both.sum(axis=0), np.eye(self.people)
+        share = np.divide((both * self.related.T).sum(axis=0), total, out=np.zeros(len(i)), where=total > 0)
         out[i, j] = out[j, i] = share
         return out
 

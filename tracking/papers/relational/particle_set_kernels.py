@@ -103,25 +103,6 @@ def moments(pos: Array, vel: Array, exist: Array, weights: Array, mean: Array, c
 
 
 @njit(cache=True)
-def shares(pairs: Ints, related: Bools, weights: Array, exist: Array, one_weight: bool) -> Array:
-    """Returns the share of the particles' weight in which both people of a pair exist that has them related, (N,); 0
-    without weight. pairs (N, 2); related (N, P); weights, exist (P, K)."""
-    total, part = np.zeros(len(pairs)), np.zeros(len(pairs))
-    for p in range(len(exist)):
-        for k in range(len(pairs)):
-            i, j = pairs[k, 0], pairs[k, 1]
-            both = weights[p, j] * exist[p, i] * exist[p, j]
-            if not one_weight:
-                both *= weights[p, i]
-            total[k] += both
-            if related[k, p]:
-                part[k] += both
-    for k in range(len(pairs)):
-        part[k] = part[k] / total[k] if total[k] > 0.0 else 0.0
-    return part
-
-
-@njit(cache=True)
 def reached(pos: Array, points: Array, most: float) -> Ints:
     """Returns the pairs (N, 2) of a person and a detection within reach of the box round the person's particles.
 

@@ -199,10 +199,12 @@ class Particle(PointTracker):
         """Returns the probability (K,) that each person has not left: hidden since the last measurement against gone
         then, by the rates of `existence`; 1 if measured or with the paper's sensor."""
         c, seen = self.config, self.slots.seen
+        if seen.all() or c.certain_sensor:
+            return np.ones(len(seen))
         # people leave with their partners: whose partner is measured is hidden
         alone = 1 - (self.particles.together() * seen).max(axis=1, initial=0.0)
         gone = alone * existence.SHOWN_TIME / existence.LIFETIME * np.exp(self.slots.missed / c.hidden_time)
-        return np.where(seen | c.certain_sensor, 1.0, 1 / (1 + gone))
+        return np.where(seen, 1.0, 1 / (1 + gone))
 
     def _follow(self, state: Array) -> None: ...
 
