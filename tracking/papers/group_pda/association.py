@@ -194,7 +194,7 @@ def remember(
 
     predicted (G, 2): the groups' centroids before the update.
     """
-    rows, shared = np.flatnonzero(exclusive.any(1)).tolist(), (exclusive & (claims.claimants > 1)).any(1)
+    rows, shared = np.flatnonzero(exclusive.any(1)).tolist(), np.asarray((exclusive & (claims.claimants > 1)).any(1))
     reach, hidden = scaled.scale * scaled.config.carry_reach, _hidden_members(bank, rows, claims.points, scaled, t)
     for row, gone in zip(rows, hidden, strict=True):
         own, past = np.flatnonzero(exclusive[row]), bank.members[row]
