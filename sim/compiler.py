@@ -4,14 +4,10 @@ numba caches compiled kernels beside their files or in the user's cache folder. 
 and numba then refuses to compile. The cache goes to a temporary folder of the user in that case, or is left out. numba
 looks at the file of a kernel alone; here, a change of its options, of this module or of what it imports makes it
 compile anew, too.
-
-What other kernels call is compiled without the wrappers for calls from Python, and Python collects no garbage while
-kernels are compiled. `sim.numba_shortcuts` makes numba itself faster, or is left out where numba's inside is another.
 """
 
 from __future__ import annotations
 
-import gc
 import hashlib
 import os
 import stat
@@ -19,40 +15,30 @@ import tempfile
 import time
 import warnings
 from collections.abc import Callable
-from functools import cache, partial
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numba
 import numpy as np
-from numba.core import event, types
-
-try:
-    from sim.numba_shortcuts import INNER
-except (ImportError, AttributeError):  # numba has other parts inside: it compiles as usual
-    INNER: dict[str, Any] | None = None  # type: ignore[no-redef]
+from numba.core import event
 
 config: Any = numba.config
-unliteral: Any = types.unliteral
 register: Any = event.register
-SOURCES = (Path(__file__), Path(__file__).with_name("numba_shortcuts.py"))
-OWN = (hashlib.sha256(b"".join(path.read_bytes() for path in SOURCES)).hexdigest(), INNER is None)
+OWN = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()
 NO_CACHE = (
     "kernels are compiled anew in every process: their cache has no place, because neither the installation nor the "
     "home folder nor the temporary folder can be written; set NUMBA_CACHE_DIR to a folder that can"
 )
 
 
-def cached_njit(shared: bool = False, **options: Any) -> Callable[[Any], Any]:
+def cached_njit(**options: Any) -> Callable[[Any], Any]:
     """Returns a decorator: numba's njit, whose cache goes to the first place that can be written.
 
     x / 0 is inf or nan, x // 0 of whole numbers is 0.
-
-    shared: the kernel is called from Python and from kernels with the same types, so that one form serves both.
     """
-
-    options["no_cfunc_wrapper"] = True  # it serves kernels that are arguments of others
-    options["error_model"] = "numpy"  # one for all: what np.empty and others compile to depends on it
+    # one error model for all: what np.empty and others compile to depends on it
+    options = {"error_model": "numpy", "no_cfunc_wrapper": True, **options}
 
     def compiled(function: Any) -> Any:
         if not options.get("cache"):
@@ -68,59 +54,9 @@ def cached_njit(shared: bool = False, **options: Any) -> Callable[[Any], Any]:
             return numba.njit(**{**options, "cache": False})(function)
         stored = _stored(kernel)
         stored._source_stamp = (stored._source_stamp, _used_by(function), OWN, repr(sorted(options.items())))
-        if INNER is not None:
-            inner = kernel if shared else numba.njit(**{**options, "cache": False, **INNER})(function)
-            _call_by_kernels(kernel, inner)
         return kernel
 
     return compiled
-
-
-def _call_by_kernels(kernel: Any, inner: Any) -> None:
-    """Makes other kernels call `inner`, a form of `kernel` without the wrapper for calls from Python and without cache.
-
-    A form of the kernel that exists already is used instead.
-    """
-    own_template, own_overload = kernel.get_call_template, kernel.get_overload
-
-    def get_call_template(arguments: Any, named: Any) -> Any:
-        plain = tuple(unliteral(a) for a in kernel.fold_argument_types(arguments, named)[1])
-        template = own_template if inner is kernel or plain in kernel.overloads else inner.get_call_template
-        return template(plain, {})
-
-    def get_overload(arguments: Any) -> Any:
-        return (own_overload if tuple(arguments) in kernel.overloads else inner.get_overload)(arguments)
-
-    kernel.get_call_template, kernel.get_overload = get_call_template, get_overload
-
-
-class _Compiling(event.Listener):
-    """Whether numba compiles now (depth above 0), and for how many seconds it has compiled in this process."""
-
-    def __init__(self) -> None:
-        self.depth, self.seconds, self._begun, self._collects = 0, 0.0, 0.0, False
-
-    def on_start(self, event: Any) -> None:
-        if self.depth == 0:
-            self._begun, self._collects = time.perf_counter(), gc.isenabled()
-            gc.disable()
-        self.depth += 1
-
-    def on_end(self, event: Any) -> None:
-        self.depth -= 1
-        if self.depth == 0:
-            self.seconds += time.perf_counter() - self._begun
-            if self._collects:
-                gc.enable()
-
-
-compiling = _Compiling()
-register("numba:compile", compiling)
-
-
-def clock() -> float:
-    """Returns the seconds of a clock that stands still while kernels are compiled."""
-    return time.perf_counter() - compiling.seconds
 
 
 def _stored(kernel: Any) -> Any:
@@ -141,12 +77,36 @@ def _used_by(function: Any) -> str:
     return used.hexdigest()
 
 
+class _Compiling(event.Listener):
+    """Whether numba compiles now (depth above 0), and for how many seconds it has compiled in this process."""
+
+    def __init__(self) -> None:
+        self.depth, self.seconds, self._begun = 0, 0.0, 0.0
+
+    def on_start(self, event: Any) -> None:
+        if self.depth == 0:
+            self._begun = time.perf_counter()
+        self.depth += 1
+
+    def on_end(self, event: Any) -> None:
+        self.depth -= 1
+        if self.depth == 0:
+            self.seconds += time.perf_counter() - self._begun
+
+
+compiling = _Compiling()
+register("numba:compile", compiling)
+
+
+def clock() -> float:
+    """Returns the seconds of a clock that stands still while kernels are compiled."""
+    return time.perf_counter() - compiling.seconds
+
+
 if TYPE_CHECKING:  # a kernel is for mypy what numba's own decorator makes of it
     from numba import njit as njit
-
-    shared_njit = njit
 else:
-    njit, shared_njit = cached_njit, partial(cached_njit, shared=True)
+    njit = cached_njit
 
 
 @cache

@@ -23,7 +23,7 @@ SCORING = (
 )  # fmt: skip
 
 
-NUMBA = "sim.compiler sim.numba_shortcuts"
+NUMBA = "sim.compiler"
 TRUTH = ("Truth", "FrameTruth", "truth", "load_truth")
 
 

@@ -21,7 +21,8 @@ from sim.types import Array, Bools, Ints, Truth
 from tracking.filters.person_streams import PersonStreams
 from tracking.papers.joint.config import SPEED_PRIOR, JointConfig
 from tracking.papers.joint.decentralised_filter import Nested, advance
-from tracking.papers.joint.distributions import BIRTHS, RESAMPLING, STATE, FrameModel, process_noise
+from tracking.papers.joint.distributions import BIRTHS, RESAMPLING, STATE, FrameModel
+from tracking.papers.joint.individuals import process_noise
 from tracking.stats import paired
 
 HISTORY = 6  # With 8 no figure changes.

@@ -21,7 +21,7 @@ from math import sqrt
 
 import numpy as np
 
-from sim.compiler import njit, shared_njit
+from sim.compiler import njit
 from sim.elementary_kernels import find_root, sort_by
 from sim.types import Array, Bools, Ints
 
@@ -94,12 +94,12 @@ def overlaps(mean: Array, shape: Array) -> Bools:
     """Returns flags (G, G): True where two filled ellipses, centres mean (G, 2), matrices (G, 2, 2), overlap."""
     count = len(mean)
     found = np.ones((count, count), np.bool_)
+    region = np.empty((count, 5))
     for i in range(count):
+        region[i, MEAN_X], region[i, MEAN_Y] = mean[i, 0], mean[i, 1]
+        region[i, A_XX], region[i, A_XY], region[i, A_YY] = shape[i, 0, 0], shape[i, 0, 1], shape[i, 1, 1]
         for j in range(i):
-            a, b = shape[i], shape[j]
-            dx, dy = mean[j, 0] - mean[i, 0], mean[j, 1] - mean[i, 1]
-            found[i, j] = overlap(dx, dy, a[0, 0], a[0, 1], a[1, 1], b[0, 0], b[0, 1], b[1, 1])
-            found[j, i] = found[i, j]
+            found[i, j] = found[j, i] = meet(region[i], region[j])
     return found
 
 
@@ -148,7 +148,7 @@ def unset(count: int) -> Ints:
     return out
 
 
-@shared_njit(cache=True)
+@njit(cache=True)
 def closure(sums: Array, gate: float, prior: Array, strength: float) -> Ints:
     """Returns the first component that each of K is joined with, (K,) (G_x, sec. 3.1)."""
     k = len(sums)
@@ -317,7 +317,7 @@ def _join(parent: Ints, sums: Array, a: int, b: int, left: Ints) -> None:
     left[0] -= 1
 
 
-@shared_njit(cache=True)
+@njit(cache=True)
 def components(points: Array, weights: Array, link: float) -> tuple[Ints, Array]:
     """Returns the component of each point (M,), numbered by first points, and the moments (K, 6) of the components."""
     m = len(points)

@@ -18,8 +18,7 @@ from sim.types import Array
 GOLDEN: Any = np.uint64(0x9E3779B97F4A7C15)
 FIRST, SECOND = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
 SHIFTS = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(12)
-# Exponent of the floats in [1, 2), whose 52 other bits are random.
-ONE_TO_TWO = np.uint64(0x3FF0000000000000)
+STEP = 2.0**-52  # Of the uniform numbers, which have 52 random bits.
 HALF_STEP = 2.0**-53
 
 
@@ -43,16 +42,14 @@ def mix_in(key: Any, values: Any) -> None:
 def fill_uniforms(begin: Any, key: Any, out: Array) -> None:
     """Writes uniform numbers in [0, 1) into out (A, K, C); begin (1,): uint64, of all; key (K,): uint64, of each."""
     rows, people, columns = out.shape
-    bits = np.empty(rows * columns, np.uint64)
-    values = bits.view(np.float64)
+    at = np.empty(people, np.uint64)
     for k in range(people):
-        # floats in [1, 2) are made from bits alone, without a division
-        at = mixed(begin[0] ^ key[k])
-        for n in range(len(bits)):
-            bits[n] = (mixed(at + np.uint64(n + 1) * GOLDEN) >> SHIFTS[3]) | ONE_TO_TWO
-        for a in range(rows):
+        at[k] = mixed(begin[0] ^ key[k])
+    for a in range(rows):  # in the order in which numbers lie in memory
+        for k in range(people):
             for c in range(columns):
-                out[a, k, c] = values[a * columns + c] - 1.0
+                bits = mixed(at[k] + np.uint64(a * columns + c + 1) * GOLDEN) >> SHIFTS[3]
+                out[a, k, c] = np.int64(bits) * STEP
 
 
 @njit(cache=True)

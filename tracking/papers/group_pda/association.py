@@ -104,13 +104,16 @@ def associate(
     have, (G, M); a point is one group's at most.
 
     A group whose points are all more probably others' is only predicted: it is hidden (ours)."""
-    log_density = point_log_density(bank.size, region, claims, log_ratio)
+    size = bank.size.copy()
     x, P = bank.x.copy(), bank.P.copy()
     state, chosen = kernels.associate(
         claims.points, claims.weights, claims.d2, log_ratio, claims.owner, claims.claimants,
         bank.x, bank.P, bank.extent, bank.size, bank.null_time > 0, scaled.kernel_rules,
     )  # fmt: skip
-    mine = chosen & (np.arange(len(bank))[:, None] == shares(log_density, chosen).argmax(0)) if len(bank) else chosen
+    mine, shared = chosen.copy(), np.flatnonzero(chosen.sum(0) > 1)
+    log_density = point_log_density(size, region, claims.d2[:, shared], log_ratio[:, shared])
+    likeliest = np.where(chosen[:, shared], log_density, -np.inf).argmax(0) if len(bank) else shared
+    mine[:, shared] = np.arange(len(bank))[:, None] == likeliest
     its = mine if scaled.config.corrections else chosen
     has_new_point = (its & (claims.last_seen >= t)).any(1)  # more than missed members
     measured, null = (state == kernels.MEASURED) & has_new_point, (state == kernels.NULL) & has_new_point
@@ -123,14 +126,11 @@ def associate(
     return mine
 
 
-def point_log_density(size: Array, region: Array, claims: PointClaims, log_ratio: Array) -> Array:
-    """Returns the log of N_g N(y; xi_g, S_g) times the ratio that `log_ratio` has of each point y and group g, (G, M),
-    without its constant; -inf where a group may not have the point."""
+def point_log_density(size: Array, region: Array, d2: Array, log_ratio: Array) -> Array:
+    """Returns the log of N_g N(y; xi_g, S_g) times the ratio of which `log_ratio` (G, M) is the log, of each group and
+    point y of this frame, (G, M), without its constant; -inf where a group may not have the point."""
     log_weight = np.log(np.maximum(size, 1e-300)) - np.log(np.linalg.det(region)) / 2
-    found = log_weight[:, None] - claims.d2 / 2 + log_ratio
-    owned = np.flatnonzero(claims.owner >= 0)
-    found[claims.owner[owned], owned] = 0.0
-    return np.asarray(found)
+    return np.asarray(log_weight[:, None] - d2 / 2 + log_ratio)
 
 
 STRAY = 0.5  # m/s: by which members' places grow uncertain (ours).
@@ -139,35 +139,25 @@ LEAST_PLACES = 0.05
 MOST_PLACES = 64  # Places that are compared: bounds memory from pixels.
 
 
-def place_density(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> Array:
+def place_density(bank: GroupBank, points: Array, may: Bools, scaled: ScaledParameters, t: float) -> Array:
     """Returns the density (G, M) of the points about the places to which each group's members have walked on since no
-    other group could have its points, and a little of it all over the group's extent."""
+    other group could have its points, where `may` (G, M), and a little of it all over the group's extent."""
     density = np.tile(LEAST_PLACES / np.sqrt(np.linalg.det(bank.extent))[:, None], len(points))
-    for row, (then, velocity, places) in enumerate(bank.unshared):
+    for row in np.flatnonzero(may.any(1)).tolist():
+        then, velocity, places = bank.unshared[row]
         some = places[:: len(places) // MOST_PLACES + 1]
-        away = np.square(points[:, None] - some - (t - then) * velocity).sum(2)
+        away = np.square(points[may[row], None] - some - (t - then) * velocity).sum(2)
         var = 2 * scaled.point_sd**2 + np.square(scaled.scale * STRAY * (t - then))
-        density[row] += (np.exp(-away / var / 2) / var).mean(1)
+        density[row, may[row]] += (np.exp(-away / var / 2) / var).mean(1)
     return density
 
 
-def log_ratio(density: Array, claims: PointClaims) -> Array:
-    """Returns log p(y | g) - log p(y | other groups) (G, M) of each shared point y, given p (G, M), and 0 of others."""
-    ratio, shared = np.zeros(claims.d2.shape), np.flatnonzero(claims.claimants > 1)
-    may = np.isfinite(claims.d2[:, shared])
-    p = np.where(may, density[:, shared], 0.0)
-    others = np.where(may, (p.sum(0) - p) / (claims.claimants[shared] - 1), 1.0)
-    ratio[:, shared] = np.log(np.where(may, p, 1.0)) - np.log(others)
-    return ratio
-
-
-def shares(log_density: Array, may: Bools) -> Array:
-    """Returns the probability (G, M) that each point is each group's: by density, among groups that `may` have it."""
-    share, shared = may.astype(float), np.flatnonzero(may.sum(0) > 1)
-    log = np.where(may[:, shared], log_density[:, shared], -np.inf)
-    density = np.exp(log - log.max(0, initial=-np.inf))
-    share[:, shared] = density / density.sum(0)
-    return share
+def log_ratio(density: Array, may: Bools) -> Array:
+    """Returns log p(y | g) - log p(y | other groups) (G, S) of shared points y and the groups that `may` (G, S) have
+    them, given p (G, S); 0 of other groups."""
+    p = np.asfortranarray(np.where(may, density, 0.0))  # numpy sums each point's groups alike, of one and of many
+    others = np.where(may, (p.sum(0) - p) / (may.sum(0) - 1), 1.0)
+    return np.asarray(np.log(np.where(may, p, 1.0)) - np.log(others))
 
 
 def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledParameters, t: float) -> PointClaims:
@@ -189,18 +179,12 @@ def with_missed_members(claims: PointClaims, bank: GroupBank, scaled: ScaledPara
 def missed_members(bank: GroupBank, points: Array, scaled: ScaledParameters, t: float) -> tuple[Array, Ints, Array]:
     """Returns the places (K, 2), rows of the bank (K,) and last measurements (K,) in s of the members missed at time t
     (s)."""
-    c, recent = scaled.config, []
-    if c.carry_time > 0 and not scaled.from_pixels:
-        for row, members in enumerate(bank.members):
-            late = members.known & (t - members.last_seen <= c.carry_time + 1e-9)
-            if late.any():
-                place = members.offset[late] + bank.x[row, :2]
-                recent.append((place, np.full(int(late.sum()), row), members.last_seen[late]))
-    if not recent:
-        return np.zeros((0, 2)), np.zeros(0, np.int64), np.zeros(0)
-    place, row_of, last_seen = (np.concatenate(part) for part in zip(*recent, strict=True))
-    missed = ~any_within(place, points, scaled.scale * c.carry_reach)
-    return place[missed], row_of[missed], last_seen[missed]
+    c = scaled.config
+    place, row, last_seen, known = bank.members_of(range(len(bank)))
+    late = known & (t - last_seen <= c.carry_time + 1e-9)
+    late &= c.carry_time > 0 and not scaled.from_pixels
+    late[late] = ~any_within(place[late], points, scaled.scale * c.carry_reach)
+    return place[late], row[late], last_seen[late]
 
 
 def remember(
@@ -210,22 +194,28 @@ def remember(
 
     predicted (G, 2): the groups' centroids before the update.
     """
-    for row in np.flatnonzero(exclusive.any(1)).tolist():
-        mine, last_seen = claims.points[exclusive[row]], claims.last_seen[exclusive[row]]
-        if not (exclusive[row] & (claims.claimants > 1)).any():
+    rows, shared = np.flatnonzero(exclusive.any(1)).tolist(), np.asarray((exclusive & (claims.claimants > 1)).any(1))
+    reach, hidden = scaled.scale * scaled.config.carry_reach, _hidden_members(bank, rows, claims.points, scaled, t)
+    for row, gone in zip(rows, hidden, strict=True):
+        own, past = np.flatnonzero(exclusive[row]), bank.members[row]
+        mine, known = claims.points[own], np.zeros(len(own), bool)
+        if not shared[row]:
             bank.unshared[row] = Unshared(t, bank.x[row, 2:].copy(), mine)
-        offset, places = mine - bank.x[row, :2], bank.members[row].offset + predicted[row]
-        reach = scaled.scale * scaled.config.carry_reach
         if not scaled.from_pixels:
-            bank.anchor[row] += predicted[row] - bank.x[row, :2] + displacement(places, mine, reach)
-        known = any_within(mine, places, reach)
-        parts = zip((offset, last_seen, known), _hidden_members(bank, row, claims.points, scaled, t), strict=True)
+            walked, known = displacement(past.offset + predicted[row], mine, reach)
+            bank.anchor[row] += predicted[row] - bank.x[row, :2] + walked
+        parts = zip(
+            (mine - bank.x[row, :2], claims.last_seen[own], known),
+            (past.offset[gone], past.last_seen[gone], past.known[gone]),
+            strict=True,
+        )
         bank.members[row] = MemberPlaces(*map(np.concatenate, parts))
 
 
-def _hidden_members(bank: GroupBank, row: int, points: Array, scaled: ScaledParameters, t: float) -> MemberPlaces:
-    c, past = scaled.config, bank.members[row]
-    age = t - past.last_seen
-    hidden = past.known & (age > c.carry_time + 1e-9) & (age <= c.coast_time + 1e-9) & (c.carry_time > 0)
-    hidden &= ~any_within(bank.positions(row), points, scaled.scale * c.carry_reach) & (not scaled.from_pixels)
-    return MemberPlaces(past.offset[hidden], past.last_seen[hidden], past.known[hidden])
+def _hidden_members(bank: GroupBank, rows: list[int], points: Array, scaled: ScaledParameters, t: float) -> list[Bools]:
+    c, (place, row, last_seen, known) = scaled.config, bank.members_of(rows)
+    age = t - last_seen
+    hidden = known & (age > c.carry_time + 1e-9) & (age <= c.coast_time + 1e-9)
+    hidden &= c.carry_time > 0 and not scaled.from_pixels
+    hidden[hidden] = ~any_within(place[hidden], points, scaled.scale * c.carry_reach)
+    return np.split(hidden, np.searchsorted(row, rows[1:])) if rows else []

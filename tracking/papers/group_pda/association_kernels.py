@@ -92,8 +92,9 @@ def any_within(place: Array, points: Array, reach: float) -> Bools:
 
 
 @njit(cache=True)
-def displacement(before: Array, after: Array, reach: float) -> Array:
-    """Returns the mean displacement (2,) of the places before (K, 2) that are after (M, 2), too: 0 if none is.
+def displacement(before: Array, after: Array, reach: float) -> tuple[Array, Bools]:
+    """Returns the mean displacement (2,) of the places before (K, 2) that are after (M, 2), too: 0 if none is; and
+    whether there was a place before within reach of each of those after, (M,).
 
     A place is there, too, if it and one after are each other's nearest, at most `reach` apart; all in one unit.
     """
@@ -114,7 +115,7 @@ def displacement(before: Array, after: Array, reach: float) -> Array:
             total[0] += after[j, 0] - before[i, 0]
             total[1] += after[j, 1] - before[i, 1]
             count += 1
-    return total / max(count, 1)
+    return total / max(count, 1), least <= reach * reach
 
 
 @njit(cache=True)
@@ -197,12 +198,16 @@ def _estimate(
     x: Array, P: Array, extent: Array, size: Array, rest: bool, rules: Array,
 ) -> int:  # fmt: skip
     people, mean, cov = running_moments(points, weights, x[0], x[1], start)
-    seen = np.cumsum(np.append(0.0, fresh))[start:]  # people measured in this frame
-    S = np.empty((len(people), 3))
+    S, seen, evidence = np.empty((len(people), 3)), np.empty(len(people)), np.empty(len(people))
+    measured = shown = 0.0  # people measured in this frame; of the shared points, what colours and places tell
+    for k in range(len(points) + 1):
+        if k >= start:
+            seen[k - start], evidence[k - start] = measured, shown
+        if k < len(points):
+            measured += fresh[k]
+            shown += colour[k] if k >= start else 0.0
     log_mass = np.full(len(people), -np.inf)
     unit = weights.sum() / len(weights)  # people that one point stands for: makes m_N a mass of numbers of points
-    evidence = np.zeros(len(colour) - start + 1)
-    evidence[1:] = np.cumsum(colour[start:])
     width = rules[COUNT_SD] ** 2 + (COUNT_SHARE * size[0]) ** 2  # sigma_n^2
     for j in range(len(people)):
         if feasible[j] and people[j] > 0:

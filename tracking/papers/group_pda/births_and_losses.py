@@ -33,11 +33,8 @@ def expected_members(bank: GroupBank, scaled: ScaledParameters, t: float) -> Exp
     group's or a part's."""
     recent = t - bank.last_seen <= max(scaled.config.carry_time, scaled.dt) + 1e-9
     rows = np.flatnonzero(bank.confirmed & recent).tolist()
-    places = [bank.positions(r) for r in rows]
-    last_seen = np.concatenate([np.zeros(0), *(bank.members[r].last_seen for r in rows)])
-    group = np.repeat(bank.id[rows], [len(p) for p in places])
-    place = np.concatenate([np.zeros((0, 2)), *places])
-    return place, walking_reach(scaled, t - last_seen), group
+    place, row, last_seen, _ = bank.members_of(rows)
+    return place, walking_reach(scaled, t - last_seen), bank.id[row]
 
 
 def add_newborns(

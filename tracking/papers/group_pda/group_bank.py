@@ -6,6 +6,7 @@ measurement it *coasts*. After `coast_time` it is *lost*, and removed.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, NamedTuple
 
@@ -28,6 +29,9 @@ class MemberPlaces(NamedTuple):
     offset: Array
     last_seen: Array
     known: Bools
+
+
+NOBODY = MemberPlaces(np.zeros((0, 2)), np.zeros(0), np.zeros(0, bool))
 
 
 class Unshared(NamedTuple):
@@ -103,6 +107,14 @@ class GroupBank:
         """Returns the positions (K, 2) x, y of the members of the group in `row`: last measured places, moved with its
         centroid."""
         return self.members[row].offset + self.x[row, :2]
+
+    def members_of(self, rows: Sequence[int]) -> tuple[Array, Ints, Array, Bools]:
+        """Returns the K members of the groups in these rows, ascending: positions (K, 2), rows (K,), times last seen
+        (K,), s, and whether they are known, (K,)."""
+        members = [self.members[row] for row in rows]
+        offset, last_seen, known = (np.concatenate(part) for part in zip(NOBODY, *members, strict=True))
+        row = np.repeat(np.array(rows, np.int64), [len(m.known) for m in members])
+        return offset + self.x[row, :2], row, last_seen, known
 
     def keep(self, kept: Bools) -> None:
         """Removes the rows that are False in kept (G,) bool, in place."""

@@ -30,7 +30,7 @@ from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, SPLIT_VELOCITY
 from sim.types import Array, Bools, Ints
@@ -255,14 +255,8 @@ def moment(bank: GroupBank, a: int, b: int, scaled: ScaledParameters, t: float) 
     walked = bank.x[:, :2] + bank.anchor
     way, v = ((y[b] - y[a]) * scaled.metres_per_unit for y in (walked, bank.x[:, 2:]))
     w = bank.size[[a, b]] / bank.size[[a, b]].sum()
-    gap = _nearest(*(bank.positions(row) * scaled.metres_per_unit for row in (a, b)))
+    gap = float(cdist(*(bank.positions(row) * scaled.metres_per_unit for row in (a, b))).min())
     return PairMoment(t, way, v, w @ bank.x[[a, b], :2], gap)
-
-
-def _nearest(here: Array, there: Array) -> float:
-    tree = cKDTree(there, balanced_tree=False, compact_nodes=False)
-    most = tree.query(here[::100])[0].min()
-    return float(tree.query(here, distance_upper_bound=1.001 * most + 1e-9)[0].min())
 
 
 # G_x (sec. 3.1): connected components under R_x.

@@ -1,107 +1,8 @@
 """`group-pda`: groups of people tracked as wholes, from points or from foreground pixels.
 
-Gennari & Hager, "Probabilistic data association methods in visual tracking of groups", CVPR 2004. The state of a group,
-or of each part of one, is (xi, v, Sigma, N): centroid xi and velocity v, together x with covariance P; extent Sigma of
-the members' positions; number of people N. Members are at y_i = xi + s_i, s_i normal with Sigma (eq. 2.1). The steps of
-a frame (Fig. 1), with their equation (eq.) or section (sec.) and the module:
-
-    (F, Q: transition and process noise of x; S: covariance of a point about xi, in the paper Sigma; y: a point; gamma:
-    squared Mahalanobis radius `gate`; m_d, m_N, m_g: masses by the centroid's place, the number of people and the group
-    constraint)
-
-    predict    x = F x, P = F P F' + Q                                 eq. 2.3            group_bank
-    gate       {y : (y - xi)' S^-1 (y - xi) < gamma}                   eq. 2.2            association
-    associate  theta_j: unshared points and the j nearest shared ones  sec. 4.1           association_kernels
-    masses     m_tot = m_d m_N m_g: m_d, m_N                           eq. 4.2            association_mass_kernels
-               m_g = 1 if |G_y| = 1 (feasible), else 0                 eq. 4.1            filters.components_kernels
-    update     x, P, Sigma, N as means over the associations           eq. 2.4, sec. 4.3  association_kernels
-    split      a group whose associations all have m_g = 0             sec. 3.3, 4.2      merging_and_splitting
-    merge      R_x: overlapping regions and like velocities            sec. 3.1           merging_and_splitting
-               x, Sigma, N of the union, means weighted by N           sec. 3.2, eq. 3.1  merging_and_splitting
-    birth      unclaimed points, grouped by G_y                        sec. 3.3           births_and_losses
-
-The grouping functions G_0, G_x, G_y of points (sec. 3.1, 3.3, 4.2.1) are in tracking.filters.components: G_y links
-points at most 2 x `radius` apart, and joins linked sets whose regions overlap. A group or part without points for
-`coast_time` is lost; a group leaves with its last part. `association = "none"` is section 5.2.1: a group takes all
-points in its region, whether they are one group or not, and does not fall apart. With `corrections` it may be hidden.
-
-Departures. Those marked (c) are off with `corrections` off.
-
-- units: m and s, in an image by one scale. Paper: px and frames. Why: any camera and frame rate.
-- F, Q: constant velocity, white acceleration that is constant in a frame. Paper: not stated. Why: any frame rate.
-- search region of the gate, and distances that order shared points: by Σ, P and a point's variance. Paper: Σ, as in
-  merges here. Why: few points give a small Σ.
-- extents: with 1/N, shrunk by `spread_weight` to a prior, `person_spread`; (c) corrected for the gate. Paper: sample
-  covariance. Why: few people; with 1/N eq. 3.1 is exact.
-- G_x in G_y: repeated until nothing changes. Paper: applied once. Why: joined regions overlap others.
-- noise, (c): from pixels, components below 0.25 people do not count in G_y. Paper: all count. Why: specks of
-  foreground.
-- births: confirmed after `confirm_time`, merged from the next frame on, removed after as long without points; until
-  confirmed no points of a confirmed group. Paper: at once. Why: false alarms.
-- P: Σ w² P of merged groups; new ones r² (1 + 1/N) and 1.3 m/s per axis. Paper: none. Why: filter and SR_v need one.
-- R, (c): members keep places, some are missed, stand-ins repeat their errors. Paper: a member's place and noise, read
-  as Σ / m, of m people. Why: less noise.
-- m_d: covariance H P H' + R, with the R of each association's m. Paper: one P_yc. Why: fewer people measure a centroid
-  worse.
-- m_N: σ_n grows with N, by 1 %; heavy tails. Paper: normal, σ_n. Why: several join at once.
-- α_s and α_N: equal, from `extent_time`. Paper: two constants. Why: one parameter less.
-- missed detections: from points, missed members who were seen twice stand in for `carry_time` while the group has
-  points, and their places stay the group's for `coast_time`. Paper: not considered. Why: detectors miss people.
-- stand-ins: associations of stand-ins alone leave x and P as they are, and are no infeasible time. Paper: none. Why:
-  their places come from x.
-- Σ and N: rest until infeasible time is counted back. Paper: always updated. Why: they would swell.
-- no points: coasts, lost after `coast_time`. Paper: null masses, as before a split. Why: occlusion.
-- frames that nobody observed: predicted only. The next observed frame stands for the time since the last, but for no
-  more than that one did; of the rest the share `coast_time` / 15 s counts as without points. Paper: none. Why: gaps
-  are no evidence, and who is in view leaves after 15 s on average.
-- an association without points: has no mass. Paper: j = 0 may be empty. Why: it has no centroid.
-- hidden feet: with boxes and a camera not overhead, points whose feet another box may hide are put no further than
-  below heads at 1.5 m. Paper: points as they are. Why: hidden feet displace points.
-- pixels: foreground of tracking.detect on a grid of 0.1 m, each a share of a person, put where on the ground that
-  person's middle is: the runs along the images of upright lines are cut into people from the feet upwards, as who is in
-  front hides the others; a run shorter than a person is continued to that height into the runs that it then reaches.
-  The background rests where groups are. Paper: all of an unnamed background subtraction, each counts one, in px. Why: N
-  in people; speed; near and far people are alike, and who stands behind is apart.
-- too much foreground: predicted only, if the background adapts. Paper: none. Why: the light has changed.
-- colours: in the mass, order and division of shared points (`appearance`), from pixels; learned from unshared points,
-  over `extent_time`. Paper: future work. Why: similar groups cross.
-- places, (c): in the same, from points, too: where members have walked since none of the group's points could be
-  another's. Paper: none. Why: groups that meet keep their people.
-- split: after `split_time`, until then predicted only; measured frames count back; colours and age go along. Paper:
-  after consecutive infeasible frames (Fig. 1: at once). Why: misses.
-- parts, (c): what falls apart is tracked as parts with a state each, but stays one group, their union (eq. 3.1), until
-  some have been more than 1.5 m from the rest for `confirm_time`; a part that is not measured, or infeasible, holds the
-  others; R_x joins parts again. Paper: new groups at once. Why: misses and sway take people apart for a moment.
-- split into one part or none: the group stays as it is. Paper: initialised anew. Why: others' points made it
-  infeasible.
-- points of a split, and members' places: those most probably the group's, with stand-ins. Paper: all in the region.
-  Why: others' people stay out.
-- ids: the part that was largest when the group fell apart keeps the id, after its loss the largest left; of merged
-  groups the largest, then the oldest. Paper: none. Why: tracks need ids.
-- walking out: a new group within reach of a member (2 m/s and 3 r) is a part of its group and as old; without
-  corrections it splits off once confirmed. Paper: a new group. Why: splits without shared points.
-- like velocities, (c): evidence from their difference, on the mean of two steps, against `merge_velocity`; from points
-  of the members seen in both of two frames, stand-ins as predicted; of a group in parts, those of the part with its id.
-  Paper: SR_v overlap. Why: P does not measure likeness; people sway with each step; hidden members move the centroid.
-- SR_v, without corrections: of the updated velocity, with the gate's γ. Paper: of the predicted one; its size is not
-  stated. Why: Fig. 1 merges after the update.
-- near groups, (c): people more than 1.5 m apart are evidence against one group, too. Paper: regions overlap. Why: no
-  merge after a split.
-- merge: of confirmed, feasible groups whose part with the id is measured; their measured parts become one state; (c)
-  once the evidence of the last 5 s is `merge_time`; gaps up to `coast_time` count. Paper: at once. Why: crossing
-  groups.
-- no event: a merge if at most one of the groups was there 2 s before the onset, and a split if the group was not; an
-  enter in the first second; an enter or leave of one person. Paper: none. Why: they came together, were never one
-  group, were there before, or are none.
-- hidden, (c): a group or part whose points are all more probably others' keeps x and P as predicted, and coasts. Paper:
-  groups share points. Why: hidden groups follow others.
-- reports: parts that had points within `report_coast`, with hulls of members' places. Paper: every group, with its
-  search region. Why: lost groups are guesses.
-- onsets: a merge, (c), to when its evidence was least, else this frame; a split to when the last two parts would have
-  been 1.5 m apart, had they moved straight, as fast as when it is decided, at least 0.7 m/s; enter and leave to the
-  first and last points, a leave later by the unobserved time that is no evidence. Paper: none. Why: decisions lag.
-- depth of points in an image: divided by the sine of the tilt in what merges, splits and onsets take in m. Paper: px.
-  Why: oblique views.
+Gennari & Hager, "Probabilistic data association methods in visual tracking of groups", CVPR 2004. The steps of a frame
+are those of its Fig. 1: predict, gate, associate, update, births, split, merge. docs/trackers/group-pda.md has the
+equations with their modules, and the departures.
 """
 
 from __future__ import annotations
@@ -295,11 +196,12 @@ class GroupPda:
         d2 = gated_distances(bank, points, region, scaled)
         claims = with_missed_members(claimed(points, weights, d2, t), bank, scaled, t)
         expected = expected_members(bank, scaled, t)
-        ratio = np.zeros(claims.d2.shape)
-        if self.config.corrections and (claims.claimants > 1).any():
-            ratio += log_ratio(place_density(bank, claims.points, scaled, t), claims)
+        ratio, shared = np.zeros(claims.d2.shape), np.flatnonzero(claims.claimants > 1)
+        may = np.isfinite(claims.d2[:, shared])
+        if self.config.corrections:
+            ratio[:, shared] += log_ratio(place_density(bank, claims.points[shared], may, scaled, t), may)
         if scaled.colour_bins:
-            ratio += self.config.appearance * log_ratio(colour_density(bank, self.colours), claims)
+            ratio[:, shared] += self.config.appearance * log_ratio(colour_density(bank, self.colours[shared]), may)
         mine = associate(bank, claims, region, ratio, scaled, t)
         remember(bank, claims, mine, predicted, scaled, t)
         if scaled.colour_bins:

@@ -9,6 +9,7 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
+from tracking.filters.nearest_kernels import empty_cells, nearest, put, take
 from tracking.papers.joint.partition_labels_kernels import validity_of
 
 # Largest group of which all divisions into two parts are tried.
@@ -102,39 +103,84 @@ def place_newcomers(points: Array, label: Ints, uniforms: Array, sharpness: floa
     """
     particles, partitions, n = label.shape
     dims = points.shape[2]
-    total, size = np.empty((n, 2)), np.empty(n)  # by the head of a cluster: sum of the places, number of members
+    # by the head of a cluster: sum of the places, mean place, number of members
+    total, middle, size = np.empty((n, 2)), np.empty((n, 2)), np.empty(n)
+    following, after = np.empty(n, np.int64), np.empty(n, np.int64)  # next member of a cluster; next head in a cell
     own, side = np.empty((n, dims)), np.empty(n, np.int64)  # the person and the nearest cluster; 0 and 1
-    centre, scatter = np.empty((n, dims)), np.empty(n)
+    centre, scatter, corner = np.empty((n, dims)), np.empty(n), np.empty(3)
+    # the last other person alone that was nearest under this particle, and the probability to join that one
+    partner, chance = np.empty(n, np.int64), np.empty(n)
     for i in range(particles):
+        cells = empty_cells(points[i], n, corner)
+        partner[:] = -1
         for j in range(partitions):
             groups = label[i, j]
+            _clusters(points[i], groups, total, size, following)
+            cells[:] = -1
             for k in range(n):
-                total[k, 0], total[k, 1], size[k] = 0.0, 0.0, 0.0
-                _add(points[i], k, k if groups[k] == 0 else groups[k] - 1, total, size)
+                if size[k] > 0:
+                    middle[k, 0], middle[k, 1] = total[k, 0] / size[k], total[k, 1] / size[k]
+                    put(middle, k, corner, cells, after)
             for person in range(n - uniforms.shape[2], n):
-                g = _nearest_cluster(total, size, person)
-                if groups[person] > 0 or g < 0:
+                if groups[person] > 0:
                     continue
-                count = 0
-                for k in range(-1, n):
-                    member = person if k < 0 else k
-                    if k < 0 or k == g or groups[k] == g + 1:
+                g = nearest(middle, person, corner, cells, after)
+                if g < 0:
+                    break
+                if size[g] > 1 or partner[person] != g:
+                    partner[person] = g if size[g] == 1 else -1
+                    count, k = 0, person
+                    while k >= 0:
                         side[count] = min(count, 1)
                         for d in range(dims):
-                            own[count, d] = points[i, member, d]
+                            own[count, d] = points[i, k, d]
+                        k = g if k == person else following[k]
                         count += 1
-                apart = validity_of(own[:count], side, 2, scales, centre, scatter)
-                side[:count] = 0
-                together = validity_of(own[:count], side, 1, scales, centre, scatter)
-                if uniforms[i, j, person - n] >= 1 / (1 + math.exp(min(sharpness * (together - apart), 700.0))):
+                    apart = validity_of(own[:count], side, 2, scales, centre, scatter)
+                    side[:count] = 0
+                    together = validity_of(own[:count], side, 1, scales, centre, scatter)
+                    chance[person] = 1 / (1 + math.exp(min(sharpness * (together - apart), 700.0)))
+                if uniforms[i, j, person - n] >= chance[person]:
                     continue
-                head = min(person, g)
-                _add(points[i], person, g, total, size)
-                total[head, 0], total[head, 1], size[head] = total[g, 0], total[g, 1], size[g]
-                size[max(person, g)] = 0.0
-                for k in range(n):
-                    if k in (person, g) or groups[k] == g + 1:
-                        groups[k] = 1 + head
+                take(middle, person, corner, cells, after)
+                take(middle, g, corner, cells, after)
+                head = _joined(points[i], person, g, groups, total, size, following)
+                middle[head, 0], middle[head, 1] = total[head, 0] / size[head], total[head, 1] / size[head]
+                put(middle, head, corner, cells, after)
+
+
+@njit(cache=True)
+def _clusters(points, groups, total, size, following):  # type: ignore[no-untyped-def]
+    for k in range(len(groups)):
+        following[k], head = -1, k if groups[k] == 0 else groups[k] - 1
+        if head == k:
+            total[k, 0], total[k, 1], size[k] = 0.0, 0.0, 0.0
+        else:
+            size[k] = 0.0
+            last = head
+            while following[last] >= 0:
+                last = following[last]
+            following[last] = k
+        _add(points, k, head, total, size)
+
+
+@njit(cache=True)
+def _joined(points, person, g, groups, total, size, following):  # type: ignore[no-untyped-def]
+    head, other = min(person, g), max(person, g)
+    _add(points, person, g, total, size)
+    total[head, 0], total[head, 1], size[head] = total[g, 0], total[g, 1], size[g]
+    size[other] = 0.0
+    if head == g:  # members are in ascending order
+        before = g
+        while 0 <= following[before] < person:
+            before = following[before]
+        following[before], following[person] = person, following[before]
+    else:
+        following[person] = g
+    k = head
+    while k >= 0:
+        groups[k], k = 1 + head, following[k]
+    return head
 
 
 @njit(cache=True)
@@ -142,14 +188,3 @@ def _add(points, k, head, total, size):  # type: ignore[no-untyped-def]
     total[head, 0] += points[k, 0]
     total[head, 1] += points[k, 1]
     size[head] += 1
-
-
-@njit(cache=True)
-def _nearest_cluster(total, size, own):  # type: ignore[no-untyped-def]
-    best, least = -1, np.inf
-    for g in range(len(size)):
-        if size[g] > 0 and g != own:
-            x, y = total[g, 0] / size[g] - total[own, 0] / size[own], total[g, 1] / size[g] - total[own, 1] / size[own]
-            if x * x + y * y < least:
-                best, least = g, x * x + y * y
-    return best

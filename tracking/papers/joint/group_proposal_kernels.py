@@ -16,6 +16,7 @@ import numpy as np
 from sim.compiler import njit
 from sim.elementary_kernels import sort_by
 from sim.types import Array, Ints
+from tracking.filters.nearest_kernels import empty_cells, nearest, put
 from tracking.papers.joint.division_kernels import divide
 from tracking.papers.joint.partition_labels_kernels import clusters, same_row
 
@@ -40,27 +41,15 @@ PLACE, CROSS, RATE = range(3)
 
 
 @njit(cache=True)
-def nearest_places(places: Array, count: int, nearest: Ints) -> None:
+def nearest_places(places: Array, count: int, found: Ints) -> None:
     """Writes the nearest other one of the first `count` places (K, 2 or more) to each, of equal ones the first; -1
     without."""
-    x, order = np.empty(count), np.empty(count, np.int64)
+    corner, after = np.empty(3), np.empty(count, np.int64)
+    cells = empty_cells(places, count, corner)
     for k in range(count):
-        x[k], order[k] = places[k, 0], k
-    sort_by(x, order)
-    for at in range(count):
-        own, best, least = order[at], -1, np.inf
-        for step in (-1, 1):
-            n = at + step
-            while 0 <= n < count:
-                other = order[n]
-                dx, dy = places[other, 0] - places[own, 0], places[other, 1] - places[own, 1]
-                if dx * dx > least:  # so are all beyond
-                    break
-                far = dx * dx + dy * dy
-                if far < least or (far == least and other < best):
-                    best, least = other, far
-                n += step
-        nearest[own] = best
+        put(places, k, corner, cells, after)
+    for k in range(count):
+        found[k] = nearest(places, k, corner, cells, after)
 
 
 @njit(cache=True)

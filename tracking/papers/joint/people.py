@@ -104,8 +104,9 @@ def associate(mean: Array, cov: Array, points: Array, noise: float, odds: Array)
     (R,) of the points, 1/m^2. A pair is more probable than none, and the product of all is the largest. odds (K,): as
     `Candidates.odds`."""
     S = cov + noise**2 * np.eye(2)
-    error = points - mean[:, None]
-    d2 = np.einsum("kmi,kij,kmj->km", error, np.linalg.inv(S), error)
+    x, y = (points[:, axis] - mean[:, axis, None] for axis in range(2))
+    xx, xy, yx, yy = np.linalg.inv(S).reshape(-1, 4, 1).swapaxes(0, 1)
+    d2 = x * xx * x + x * xy * y + y * yx * x + y * yy * y
     log_density = -(d2 + np.linalg.slogdet(2 * np.pi * S)[1][:, None]) / 2
     rows, columns = optimal(-log_density - np.log(odds)[:, None], 0.0)
     return rows, columns, np.exp(log_density[rows, columns])

@@ -4,7 +4,7 @@ Each person has weights of the own and is resampled alone, so that the weights o
 one particle; the posterior is taken for a product over people (ours). In the paper's filter a particle has one weight.
 
 The relation "walking together" is kept for the pairs only that walk together in some particle, so that the cost is that
-of the neighbours. Here is also which people may start to walk together, and the relations of new people (sec. 3.2). The
+of the neighbours. `near_pairs` and `join` choose the pairs (sec. 3.2). The
 groups of a particle are the connected components of its related pairs. `transition_kernels` moves people and changes
 relations. Arrays are over P particles and K people.
 """
@@ -176,7 +176,7 @@ class ParticleSet:
         ever: Bools = np.asarray(self.related.any(axis=1))
         particle_set_kernels.group_labels(self.pairs, ever[:, None], some)
         self.hold(np.argwhere(np.triu(some == some.T, 1)))
-        self.related[:] = (label[:, self.pairs[:, 0]] == label[:, self.pairs[:, 1]]).T
+        self.related[:] = transition_kernels.same_group(label, self.pairs)
 
     def drop_strangers(self) -> None:
         """Keeps no relation of pairs that walk together in no particle."""
@@ -202,7 +202,6 @@ def near_pairs(pos: Array, rules: Array) -> Ints:
     return np.argwhere(np.triu(near, 1))
 
 
-@np.errstate(over="ignore")
 def join(pos: Array, exist: Array, label: Ints, points: Array, uniforms: Array, rules: Array) -> tuple[Ints, Bools]:
     """Relates M new people, the last slots, to the groups that they join in each particle, one after the other (sec.
     3.2). Returns their pairs (N, 2) and relations (N, P); the groups label (P, K) of the new people are changed.
@@ -214,15 +213,10 @@ def join(pos: Array, exist: Array, label: Ints, points: Array, uniforms: Array, 
     is below FAR in all particles are left out, so that the cost of a person is that of the neighbours.
     """
     old = label.shape[1] - len(points)
-    low, high = pos.min(axis=0), pos.max(axis=0)
-    apart = np.maximum(np.maximum(low - points[:, None], points[:, None] - high), 0.0)
-    close = belonging(np.sqrt(np.square(apart).sum(axis=2)), 0.0, rules) >= FAR
-    pairs, relations = [np.zeros((0, 2), np.int64)], [np.zeros((0, len(pos)), bool)]
-    for m, point in enumerate(points):
-        new, related = old + m, np.zeros((old + m, len(pos)), bool)
-        near = np.flatnonzero(close[m, :new])
-        transition_kernels.join(pos, exist, label, point, near, new, uniforms[m], rules, related)
-        others = np.flatnonzero(related.any(axis=1))
-        pairs.append(np.column_stack([others, np.full(len(others), new)]))
-        relations.append(related[others])
-    return np.concatenate(pairs), np.concatenate(relations)
+    loss, reach = rules[transition_kernels.DISTANCE], np.log(1 / FAR - 1) + rules[transition_kernels.BIAS]
+    near, new = particle_set_kernels.reached(pos, points, (reach / loss) ** 2 if loss > 0 else np.inf).T
+    new, near = new[near < old + new], near[near < old + new]
+    near, start = near[np.argsort(new, kind="stable")], np.searchsorted(np.sort(new), np.arange(len(points) + 1))
+    ever = transition_kernels.join(pos, exist, label, points, near, start, uniforms, rules)
+    pairs = np.ascontiguousarray(np.argwhere(ever)[:, ::-1]) + np.array([0, old])
+    return pairs, transition_kernels.same_group(label, pairs)

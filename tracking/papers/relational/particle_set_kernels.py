@@ -100,3 +100,28 @@ def moments(pos: Array, vel: Array, exist: Array, weights: Array, mean: Array, c
         for a in range(4):
             for b in range(a):
                 cov[k, b, a] = cov[k, a, b]
+
+
+@njit(cache=True)
+def reached(pos: Array, points: Array, most: float) -> Ints:
+    """Returns the pairs (N, 2) of a person and a detection within reach of the box round the person's particles.
+
+    pos (P, K, 2), m; points (M, 2), m; most: reach, squared distance in m^2.
+    """
+    particles, people, _ = pos.shape
+    low, high = np.empty((people, 2)), np.empty((people, 2))
+    for p in range(particles):
+        for k in range(people):
+            for axis in range(2):
+                x = pos[p, k, axis]
+                low[k, axis] = x if p == 0 else min(low[k, axis], x)
+                high[k, axis] = x if p == 0 else max(high[k, axis], x)
+    pairs, count = np.empty((people * len(points), 2), np.int64), 0
+    for k in range(people):
+        for j in range(len(points)):
+            x = max(low[k, 0] - points[j, 0], points[j, 0] - high[k, 0], 0.0)
+            y = max(low[k, 1] - points[j, 1], points[j, 1] - high[k, 1], 0.0)
+            if x * x + y * y <= most:
+                pairs[count, 0], pairs[count, 1] = k, j
+                count += 1
+    return pairs[:count].copy()

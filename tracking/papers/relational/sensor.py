@@ -15,7 +15,7 @@ from tracking.papers.relational import sensor_kernels
 from tracking.papers.relational.association_sums_kernels import sparse_sum
 from tracking.papers.relational.config import ParticleConfig
 from tracking.papers.relational.particle_set import ParticleSet
-from tracking.papers.relational.particle_set_kernels import column_sums
+from tracking.papers.relational.particle_set_kernels import column_sums, reached
 
 # Distance, in standard deviations of a point and of a displaced point, above both of which a person and a detection are
 # no pair (ours).
@@ -68,8 +68,8 @@ def weigh(
 
 def _complete(particles: ParticleSet, points: Array, noise: float) -> tuple[Ints, Array, Array]:
     most = (REACH * noise) ** 2
-    near = may_reach(particles.pos, points, most)
-    k, j = np.nonzero(near)
+    k, j = reached(particles.pos, points, most).T
+    near = np.zeros((particles.people, len(points)), bool)
     near[k, j] = (np.square(points[j] - particles.pos[:, k]).sum(axis=2) <= most).any(axis=0)
     person, point = sensor_kernels.components(near)
     pairs = np.ascontiguousarray(np.argwhere(person[:, None] == point))
@@ -86,7 +86,7 @@ def _pairs(
     share = np.zeros(particles.people) if normal else config.outlier_share + (1 - config.outlier_share) * cut
     displaced = WIDE_REACH * wide if config.outlier_share > 0 else 0.0
     reach = max(REACH * noise, displaced) ** 2
-    pairs = np.ascontiguousarray(np.argwhere(may_reach(particles.pos, points, reach)))
+    pairs = reached(particles.pos, points, reach)
     density = sensor_kernels.densities(particles.pos, points, pairs, noise, wide, share, eye, reach)
     person, weights = pairs[:, 0], particles.weights * particles.exist
     odds = column_sums(weights.take(person, 1), density) * detect[person] / config.clutter_density
@@ -95,16 +95,6 @@ def _pairs(
     mean = np.zeros((particles.people, len(points)))
     mean[person[likely], pairs[likely, 1]] = odds[likely]
     return pairs[likely], np.compress(likely, density, 1), mean
-
-
-def may_reach(pos: Array, points: Array, most: float) -> Bools:
-    """Returns which of M detections are within reach of the box round each person's particles, (K, M).
-
-    pos (P, K, 2), m; points (M, 2), m; most: reach, squared distance in m^2.
-    """
-    low, high = pos.min(axis=0)[:, None], pos.max(axis=0)[:, None]
-    apart = np.maximum(np.maximum(low - points, points - high), 0.0)
-    return np.asarray(np.square(apart).sum(axis=2) <= most)
 
 
 CANCELLED = 1e-9  # Least share of the weight without detection: below it 1 minus the marginals is rounding.

@@ -1,91 +1,8 @@
 """`particle` and `relational`: people tracked by a particle filter, without and with who walks together.
 
-Cattelani, Manfredotti, Messina, "Multiple object tracking with relations", ICPRAM 2012. The state of a particle is s =
-(s^a, s^r) (eq. 5): attributes s^a, place x and velocity v of each person; relations s^r, which pairs of people walk
-together. z are the detections of a frame, w the weights. The steps of a frame sample eq. 14, those of `particle` eq. 4;
-eqs 1 to 3 and 9 to 13 derive them:
-
-    forecast  s^a ~ p(s^a_t | s^a_t-1, s^r_t-1)  attributes from old relations  eq. 8, sec. 3.2      transition_kernels
-              v = u - B u / |u| + C e, x = x + v dt; u the old mean velocity of the group, B and C the row of
-              |u| in Table 3, per axis, e normal
-              s^r ~ p(s^r_t | s^a_t, s^r_t-1)    relations from new attributes  eq. 7                transition_kernels
-    weight    w = w p(z_t | s^a_t)               sum over all mappings          eqs 6, 12, sec. 3.3  sensor
-    deaths    not measured for `time_window`     with their relations           sec. 2.1.1           tracker
-    births    x ~ N(z, .), v ~ N(0, .)           relations of newcomers         secs. 2.1.1, 3.2     tracker
-    estimate  means over particles                                                                   particle_set
-    resample  residual sampling                                                 sec. 2.1             filters.resampling
-
-Readings: eqs 2 and 10 condition on earlier states, too; eq. 8 on earlier states and detections only. Eq. 13 lacks the
-normaliser of eqs 4 and 14. Eq. 14 ends with the posterior of the frame before. Table 3 is read with B and C in m per
-frame, and C per axis; the mean speed of a group is the mean of velocity vectors, and its members have the row of this
-mean. If people and detections differ in number, a mapping maps all of the fewer ones. The sensor's noise is the same
-along both axes and everywhere; a newcomer's place has it, too. Positions advance by the new velocity. A newcomer is
-alone with probability 1/2; people alone are groups of one. The estimate is the mean over the particles before they are
-resampled.
-
-Departures, with g(l) = 1 / (1 + exp(-l)) of l = `relation_bias` - `relation_distance` x distance -
-`relation_velocity` x difference of velocities. A star marks those that stay in the preset `paper`:
-
-- speed table: from simulated people, over 0.4 s, with rows of its own (`speed_ends`), times `noise_scale`. Paper: from
-  observations in successive frames. Why: errors of observations are no motion.
-- time*: drift and diffusion per second. Paper: per frame. Why: any frame rate.
-- relations: pairs (`relation_evidence`). Paper: one group for each person. Why: groups part in steps.
-- relation dynamics*: with the hazard `relation_rate` / 2 a person redraws all relations: to those whose g is above one
-  uniform number; in the preset the groups of these unite. Only near people start to walk together. Paper: not stated;
-  with a limited number of others. Why: it starts and stops at a rate.
-- evidence: for the relation dynamics, l is the belief about the tracks reported before this frame, measured or
-  predicted, the same in all particles; `walking_together()` returns that belief with this frame (`relation_evidence`).
-  Paper: the particle's new state (eq. 7); the posterior. Why: the belief looks back for seconds.
-- unreported people: without a track in the belief's last step, relations stay as they are (`relation_evidence`). Paper:
-  forecast. Why: no belief about them.
-- coupling: approached within `coupling_time`; partners weighted by existence and, with the belief
-  (`relation_evidence`), by g(l) of their state, less the filter's unweighted scatter. Paper: the group's mean velocity.
-  Why: members differ.
-- noise: a shared part (`common_noise`). Paper: independent. Why: a hidden member turns, too.
-- people*: slots common to all particles. Paper: each particle has a number of people. Why: few particles would have
-  each newcomer.
-- existence: a probability, computed; at birth by `birth_rate` and `clutter_density`; means over particles are weighted
-  by it. Paper: none. Why: false alarms.
-- sensor: pairs: e P_D p(z | x) / λ_c, missed: 1 − e P_D, with existence e, `detect_prob`, `clutter_density`; 1 and 0
-  switch off what follows from misses and false alarms. Paper: no misses or false alarms in the weights. Why: detectors
-  err.
-- displaced points: a share `outlier_share`, away from the camera, without one in all directions, more if feet are
-  covered. Paper: normal. Why: hidden feet.
-- misses: who was not measured is measured again with `hidden_time`; behind something nobody can be. Paper: all alike.
-  Why: occlusions last.
-- occluders: nobody is measured behind others, or behind known pillars and walls. Paper: none. Why: nobody is visible
-  there.
-- sums*: exact up to a size, then belief propagation; in the preset each set of people and detections that are linked by
-  reach in some particle is mapped by itself, without pairs that are negligible beside the best mapping, else only pairs
-  in reach and not improbable. Paper: all mappings. Why: exponential cost; nobody becomes a newcomer far away.
-- background: adapts, from pixels (`background`). Paper: none. Why: light changes.
-- pixels*: blobs; large ones are divided by k-means, small ones left out. In the image*: centres of boxes, at one scale.
-  Paper: feet of boxes on the ground. Why: no calibration.
-- boxes*: reported in the image, with sizes that follow the measured ones. Paper: none. Why: they are shown and scored.
-- frames without measurement*: forecast alone; the window of deaths stands still. Paper: each frame is measured. Why:
-  nobody could be seen.
-- births*: a detection in nobody's reach, or probably nobody's; no weight until the next frame. Paper: a new object.
-  Why: not stated when.
-- deaths*: the window slows by the probability of being behind known pillars and walls, by default also people; a person
-  counts as measured with more than 1/2. Paper: after a window, which may depend on occlusion. Why: nobody is visible
-  there.
-- deaths: also below an existence. Paper: after the window. Why: false alarms.
-- report: from `report_existence`, of existence times the probability that a missed person is hidden, not gone
-  (`hidden_time`); who has a measured partner is probably not gone. Paper: all. Why: who has left the view is missed,
-  too.
-- newcomers*: at most half join a group, by g at the distance of the nearest member times existence. Paper: half join a
-  group. Why: far groups are improbable.
-- weights: one for each person, others averaged; that of a missed person is multiplied by the likelihoods of partners
-  who are related in the particle. Paper: one for a particle, by attributes alone (eq. 6). Why: many people, few
-  particles.
-- resampling: of people with few effective particles, with a kernel. Paper: each frame. Why: equal particles.
-- resampled relations: drawn with each person alone. Paper: with the particle. Why: weights are people's.
-- groups*: reported ones are derived from the tracks. Paper: in the state. Why: particles differ in groups.
-
-Fitted, as the paper leaves them open (see the presets): B and C of Table 3, in the preset `paper` also the noise of
-positions, on fitting seeds (the preset `caviar-25fps` has Table 3 as printed); the relation's rate, bias and weights of
-distance and velocity, on training seeds. Not fitted: `time_window`, the spread of a newcomer's velocity, the number
-of particles (the paper: 500 to 4000).
+Cattelani, Manfredotti, Messina, "Multiple object tracking with relations", ICPRAM 2012. The steps of a frame are
+forecast, weight, deaths, births, estimate, resample. docs/trackers/relational.md has the equations with their modules,
+and the departures.
 """
 
 from __future__ import annotations
@@ -282,10 +199,12 @@ class Particle(PointTracker):
         """Returns the probability (K,) that each person has not left: hidden since the last measurement against gone
         then, by the rates of `existence`; 1 if measured or with the paper's sensor."""
         c, seen = self.config, self.slots.seen
+        if seen.all() or c.certain_sensor:
+            return np.ones(len(seen))
         # people leave with their partners: whose partner is measured is hidden
         alone = 1 - (self.particles.together() * seen).max(axis=1, initial=0.0)
         gone = alone * existence.SHOWN_TIME / existence.LIFETIME * np.exp(self.slots.missed / c.hidden_time)
-        return np.where(seen | c.certain_sensor, 1.0, 1 / (1 + gone))
+        return np.where(seen, 1.0, 1 / (1 + gone))
 
     def _follow(self, state: Array) -> None: ...
 

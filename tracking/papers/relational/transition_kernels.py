@@ -151,32 +151,64 @@ def relate(
 
 @njit(cache=True)
 def join(
-    pos: Array, exist: Array, label: Ints, point: Array, near: Ints, new: int, uniforms: Array, rules: Array,
-    related: Bools,
-) -> None:  # fmt: skip
-    """Writes the group label[:, new] of a new person in each particle, and the relations (K, P) to all others.
+    pos: Array, exist: Array, label: Ints, points: Array, near: Ints, start: Ints, uniforms: Array, rules: Array
+) -> Bools:
+    """Writes the groups label[:, new] of M new people, the last ones, in each particle, one after the other.
 
-    Arguments as of `particle_set.join`, of one person; near (S,): who is near, all before `new`.
+    Returns with which people before them each is in one group in some particle, (M, K).
+
+    Arguments as of `particle_set.join`; near: who is near, all before the new person, ascending; those of person m are
+    near[start[m] : start[m + 1]], start (M + 1,).
     """
-    belongs = np.zeros(new)  # by groups
+    n = label.shape[1]
+    old, ever = n - len(points), np.zeros((len(points), n), np.bool_)
+    belongs, groups = np.zeros(n), np.empty(n, np.int64)  # by groups; the groups of who is near, ascending
+    before, last = np.empty(n, np.int64), np.empty(n, np.int64)  # member before in the group; last member of a group
     for p in range(len(pos)):
-        joined = label[p, new] = new
-        if uniforms[p] >= NEWCOMER_SHARE:  # alone, whoever is near
-            continue
-        for i in near:
-            dx, dy = pos[p, i, 0] - point[0], pos[p, i, 1] - point[1]
-            likely = exist[p, i] * _belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules)
-            belongs[label[p, i]] = max(belongs[label[p, i]], likely)
-        total = 0.0
-        for g in range(new):
-            total += belongs[g]
-        left = uniforms[p] * max(total, 1.0)
-        for g in range(new):
-            left -= NEWCOMER_SHARE * belongs[g]
-            belongs[g] = 0.0
-            if left < 0 and joined == new:
-                joined = g
-        if joined < new:
-            label[p, new] = joined
-            for i in range(new):
-                related[i, p] = label[p, i] == joined
+        for i in range(n):
+            if i >= old:
+                label[p, i] = i
+            g = label[p, i]
+            before[i] = last[g] if g < i else -1
+            last[g] = i
+        for m in range(len(points)):
+            new, count, total = old + m, 0, 0.0
+            if uniforms[m, p] >= NEWCOMER_SHARE:  # alone, whoever is near
+                continue
+            for k in range(start[m], start[m + 1]):
+                i, g = near[k], label[p, near[k]]
+                dx, dy = pos[p, i, 0] - points[m, 0], pos[p, i, 1] - points[m, 1]
+                likely = exist[p, i] * _belonging(math.sqrt(dx * dx + dy * dy), 0.0, rules)
+                if likely > 0.0 and belongs[g] == 0.0:
+                    at = count
+                    while at > 0 and groups[at - 1] > g:
+                        groups[at] = groups[at - 1]
+                        at -= 1
+                    groups[at] = g
+                    count += 1
+                belongs[g] = max(belongs[g], likely)
+            for c in range(count):
+                total += belongs[groups[c]]
+            left, joined = uniforms[m, p] * max(total, 1.0), new
+            for c in range(count):
+                left -= NEWCOMER_SHARE * belongs[groups[c]]
+                belongs[groups[c]] = 0.0
+                if left < 0 and joined == new:
+                    joined = groups[c]
+            if joined < new:
+                label[p, new], before[new], last[joined] = joined, last[joined], new
+            i = before[new]
+            while i >= 0:
+                ever[m, i] = True
+                i = before[i]
+    return ever
+
+
+@njit(cache=True)
+def same_group(label: Ints, pairs: Ints) -> Bools:
+    """Returns in which particles each pair i, j (N, 2) is in one group, (N, P); label (P, K)."""
+    same = np.empty((len(pairs), len(label)), np.bool_)
+    for k in range(len(pairs)):
+        for p in range(len(label)):
+            same[k, p] = label[p, pairs[k, 0]] == label[p, pairs[k, 1]]
+    return same

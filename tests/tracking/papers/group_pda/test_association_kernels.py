@@ -14,7 +14,7 @@ from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
 from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_kernels as kernels
-from tracking.papers.group_pda.association import PointClaims, place_density, point_log_density, remember, shares
+from tracking.papers.group_pda.association import PointClaims, place_density, point_log_density, remember
 from tracking.papers.group_pda.association_kernels import any_within, displacement
 from tracking.papers.group_pda.association_mass_kernels import centroid_noise
 from tracking.papers.group_pda.config import GroupPdaConfig
@@ -253,18 +253,18 @@ def test_whose_a_shared_point_is() -> None:
     """By N_g N(y; xi_g, S_g), so that a large diffuse group has no claim on all that lies near a compact one."""
     for seed in range(100):
         _, case, region = random_case(seed)
-        points, weights, d2, own, hits, x, _, _, size, _ = case
-        claims = PointClaims(points, weights, np.zeros(len(points)), d2, own, hits)
-        log_density = point_log_density(size, region, claims, np.zeros(d2.shape))
+        points, _, d2, own, _, x, _, _, size, _ = case
+        log_density = point_log_density(size, region, d2, np.zeros(d2.shape))
         may = np.isfinite(log_density) & (np.random.default_rng(seed).random(d2.shape) < 0.8)
-        found = shares(log_density, may)
-        np.testing.assert_allclose(found, reference.shares(points, x, region, size, own, may), rtol=1e-9, atol=1e-12)
+        some = np.flatnonzero(may.any(0))
+        density = np.exp(np.where(may, log_density, -np.inf))[:, some]
+        expected = reference.shares(points, x, region, size, own, may)[:, some]
+        np.testing.assert_allclose(density / density.sum(0), expected, rtol=1e-9, atol=1e-12)
     region, d2 = np.array([4.0, 0.25])[:, None, None] * np.eye(2), np.array([[1.0], [1.2]])
-    claims = PointClaims(np.zeros((1, 2)), np.ones(1), np.zeros(1), d2, np.full(1, -1), np.full(1, 2))
-    log_density = point_log_density(np.full(2, 2.0), region, claims, np.zeros((2, 1)))
-    assert shares(log_density, d2 > 0)[1] > 0.9  # the nearer by d2 is the diffuse one
-    colours = point_log_density(np.full(2, 2.0), region, claims, np.array([[2.0], [-2.0]]))
-    assert shares(colours, d2 > 0)[0] > 0.7
+    log_density = point_log_density(np.full(2, 2.0), region, d2, np.zeros((2, 1)))
+    assert log_density[1] > log_density[0] + 2  # the nearer by d2 is the diffuse one
+    colours = point_log_density(np.full(2, 2.0), region, d2, np.array([[2.0], [-2.0]]))
+    assert colours[0] > colours[1] + 1
 
 
 def test_a_shared_point_is_of_the_group_whose_members_walked_there() -> None:
@@ -272,15 +272,15 @@ def test_a_shared_point_is_of_the_group_whose_members_walked_there() -> None:
     bank = newborn(points, np.ones(2), np.arange(2), scaled, 5.0)
     bank.unshared = [Unshared(5.0, np.array([1 - 2 * k, 0.0]), points[k : k + 1]) for k in range(2)]
     bank.x[:, 2:] *= -1  # of no account: they may have been led astray by shared points
-    soon, late = (place_density(bank, points + np.array([[t, 0.0], [-t, 0.0]]), scaled, 5 + t) for t in (0.5, 2.0))
+    may = np.ones((2, 2), bool)
+    soon, late = (place_density(bank, points + np.array([[t, 0.0], [-t, 0.0]]), may, scaled, 5 + t) for t in (0.5, 2.0))
     assert (np.diag(soon) > 10 * soon[[1, 0], [0, 1]]).all()
     assert late.max() < 0.2 * soon.max()
     many = np.repeat(points, 2_000, 0)
     bank.unshared = [group._replace(points=np.repeat(group.points, 2_000, 0)) for group in bank.unshared]
     tracemalloc.start()
-    np.testing.assert_allclose(
-        place_density(bank, many, scaled, 5.0)[:, ::2_000], place_density(bank, points, scaled, 5.0)
-    )
+    of_many = place_density(bank, many, np.ones((2, 4_000), bool), scaled, 5.0)
+    np.testing.assert_allclose(of_many[:, ::2_000], place_density(bank, points, may, scaled, 5.0))
     assert tracemalloc.get_traced_memory()[1] < 2e7  # bytes; all pairs take more than 1e8
     tracemalloc.stop()
 
@@ -310,8 +310,10 @@ def test_displacement_is_of_mutually_nearest_places(reach: float) -> None:
     before = np.array([[0.0, 0], [4, 0], [4.3, 0]])
     after = np.array([[0.2, 0], [0, 1], [4.5, 0.4]])  # the second is nobody's; the third is of (4.3, 0), not of (4, 0)
     expected = np.array([[0.2, 0], [0.2, 0.4]])[: 1 + (reach > 1)].mean(0)
-    np.testing.assert_allclose(displacement(before, after, reach), expected, atol=1e-12)
-    assert not displacement(before[:0], after, reach).any()
+    walked, known = displacement(before, after, reach)
+    np.testing.assert_allclose(walked, expected, atol=1e-12)
+    assert known.tolist() == [True, reach > 1, reach > 1]
+    assert not any(part.any() for part in displacement(before[:0], after, reach))
 
 
 def test_gate_factor() -> None:

@@ -10,8 +10,9 @@ import pytest
 from tests.reference_joint import all_partitions, label_of, log_group_dynamics
 from tracking.filters.person_streams import PersonStreams
 from tracking.papers.joint.config import JointConfig
-from tracking.papers.joint.distributions import FrameModel, Proposal, log_density, moved, precision_of, process_noise
+from tracking.papers.joint.distributions import FrameModel
 from tracking.papers.joint.group_proposal_kernels import group_dynamics
+from tracking.papers.joint.individuals import Proposal, log_density, moved, precision_of, process_noise
 
 DT, NOISE = 0.1, 0.1
 SIGMA = process_noise(0.2, 0.8, DT)

@@ -8,7 +8,7 @@ import pytest
 from sim.types import Context, Frame
 from tests.point_frames import FPS, detections, stepped
 from tracking.papers.joint.config import JointConfig
-from tracking.papers.joint.distributions import process_noise
+from tracking.papers.joint.individuals import process_noise
 from tracking.papers.joint.tracker import Joint
 from tracking.stats import paired
 

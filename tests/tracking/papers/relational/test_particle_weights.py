@@ -10,7 +10,7 @@ import pytest
 from sim.types import Context
 from tests.point_frames import stepped
 from tests.reference_relational import drawn, relate
-from tracking.papers.relational import sensor, sensor_kernels
+from tracking.papers.relational import particle_set_kernels, sensor, sensor_kernels
 from tracking.papers.relational.association_sums_kernels import exact_sum
 from tracking.papers.relational.config import ParticleConfig, RelationalConfig
 from tracking.papers.relational.particle_set import ParticleSet
@@ -244,3 +244,13 @@ def test_probabilities_of_pairs_are_those_of_the_reported_people():
     assert together[0, 1] > 0.5
     assert together[0, 2] == together[1, 2] == 0.0
     assert together.diagonal().tolist() == [1, 1, 1]
+
+
+def test_reached_are_detections_near_the_box_of_the_particles():
+    rng = np.random.default_rng(3)
+    pos, points = rng.uniform(0, 9, (5, 12, 1)) + rng.normal(0, 0.3, (5, 12, 2)), rng.uniform(0, 9, (15, 2))
+    low, high = pos.min(axis=0)[:, None], pos.max(axis=0)[:, None]
+    apart = np.maximum(np.maximum(low - points, points - high), 0.0)
+    expected = np.argwhere(np.square(apart).sum(axis=2) <= 1.5)
+    assert len(expected)
+    assert np.array_equal(particle_set_kernels.reached(pos, points, 1.5), expected)
