@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
-from importlib import import_module
 from itertools import islice
 
 import numpy as np
@@ -43,10 +42,9 @@ def headed(tracker: str, preset: str) -> dict[str, str]:
 
 
 def departures(tracker: str) -> list[tuple[bool, set[str]]]:
-    """The departures that the tracker's page or module lists: whether it has a star, and the parameters it names."""
+    """The departures that the tracker's page lists: whether it has a star, and the parameters that it names."""
     page = (ROOT / "docs" / "trackers" / f"{tracker}.md").read_text(encoding="utf-8")
     text = page.partition("## Equations and departures")[2].partition("\n## ")[0]
-    text += import_module(find(tracker).__module__).__doc__ or ""
     known = find(tracker).config_class.params().keys()
     found = re.findall(r"^- (.*?)(?=^- |^$|\Z)", text.partition("\nDepartures")[2], re.DOTALL | re.MULTILINE)
     return [(one.partition(":")[0].endswith("*"), known & set(re.findall(r"`(\w+)`", one))) for one in found]
