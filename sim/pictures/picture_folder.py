@@ -22,7 +22,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import FRAMES, fits_picture
 from scenarios.reading import is_present
 from sim.store.own_files import is_hidden
@@ -201,9 +201,8 @@ def size_of(picture: NDArray[Any]) -> tuple[int, int]:
 
 def require_size(picture: Picture, size: tuple[int, int], path: Path, place: str = "") -> Picture:
     """Returns the picture unchanged if its (width, height) is `size`, else raises InputError."""
-    if size_of(picture) != size:
-        got, expected = "{}×{} px".format(*size_of(picture)), "{}×{} px like the first".format(*size)
-        raise InputError(file=path, place=place, got=got, expected=expected, remedy="give pictures of one size")
+    got, expected = "{}×{} px".format(*size_of(picture)), "{}×{} px like the first".format(*size)
+    reject(size_of(picture) != size, path, got, expected, "give pictures of one size", place)
     return picture
 
 

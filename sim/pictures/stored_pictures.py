@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from sim import hashing, streams
 from sim.pictures import video_files
 from sim.pictures.picture_folder import require_size
@@ -146,9 +146,7 @@ class StoredPictures:
     def check(self, name: str, whole: bool = False) -> bytes:
         """Raises InputError if a file differs from its hash in the manifest. Returns its bytes if `whole`, else b""."""
         path, files = self.folder / name, self.manifest["files"]
-        if name not in files:
-            got, expected = "a manifest that does not name it", "a file that manifest.json names"
-            raise InputError(file=path, got=got, expected=expected, remedy=REDO)
+        reject(name not in files, path, "a manifest that does not name it", "a file that manifest.json names", REDO)
         return check_file(path, files[name], whole=whole)
 
     def one(self, stream: str, index: int) -> NDArray[Any]:
@@ -181,8 +179,7 @@ class StoredPictures:
             video_files.decode_frames(path, video_files.index_packets(path), wanted), 1
         ):
             yield require_size(picture, self.size, path, f"frame {found}")
-        if found != (count if wanted is None else len(wanted)):
-            raise InputError(file=path, got=f"{found} pictures", expected=count, remedy=REDO)
+        reject(found != (count if wanted is None else len(wanted)), path, f"{found} pictures", count, REDO)
 
     def sample(self, wanted: list[int]) -> Iterable[tuple[int, Image]]:
         """Yields (frame, picture) of the left camera for the frames `wanted` (from 1, ascending)."""

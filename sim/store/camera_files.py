@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, Field
 
-from scenarios.errors import InputError
+from scenarios.errors import reject
 from sim.scene.camera import require_camera
 from sim.store import tables
 from sim.store.tables import Number, Pair, Triple, validated
@@ -40,8 +40,7 @@ class _Camera(BaseModel):
 def read_camera(path: Path) -> Camera:
     """Returns the Camera in a camera.json; missing baseline and radial are 0, a missing px_per_m is nan."""
     found = validated(path, tables.read_document(path, "give a camera.json"), _Camera, "correct it")
-    if found.px_per_m is None and found.kind == "top":
-        raise InputError(file=path, place="px_per_m", got="null", expected="a scale for kind top", remedy="add it")
+    reject(found.px_per_m is None and found.kind == "top", path, "null", "a scale for kind top", "add it", "px_per_m")
     camera = Camera(
         found.kind, (int(found.image[0]), int(found.image[1])), found.focal_px, found.centre_px,
         np.array(found.position), np.array(found.rotation), found.baseline, tables.none_to_nan(found.px_per_m),

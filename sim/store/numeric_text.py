@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import COORDINATE, DETECTIONS, FRAMES, TEXT_BYTES, XML_BYTES
 from scenarios.reading import read_regular
 from sim.types import Array, Bools, Ints
@@ -226,10 +226,9 @@ def number_or_nan(text: str | None) -> float:
 def bounded_number(path: Path, place: str, text: str | None, low: float, high: float, whole: bool = False) -> float:
     """Returns the number that a text states; InputError unless from `low` to `high` and, if `whole`, a whole number."""
     value = number_or_nan(text)
-    if not low <= value <= high or (whole and value % 1):
-        got = "nothing" if text is None else repr(text)
-        expected = f"a {'whole ' if whole else ''}number from {low:.12g} to {high:.12g}"
-        raise InputError(file=path, place=place, got=got, expected=expected, remedy="correct it")
+    got = "nothing" if text is None else repr(text)
+    expected = f"a {'whole ' if whole else ''}number from {low:.12g} to {high:.12g}"
+    reject(not low <= value <= high or (whole and value % 1), path, got, expected, "correct it", place)
     return value
 
 

@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, Field, StrictBool
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import INTEGER, PICTURE_SIZES, fits_picture
 from sim import hashing
 from sim.store import tables
@@ -199,12 +199,10 @@ def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (),
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Returns the manifest.json of a sequence folder; checks its own hash and its values, but no other file."""
     path = folder / MANIFEST
-    if not path.is_file():
-        raise InputError(file=path, got="missing", expected="the manifest of a complete sequence", remedy=REDO)
+    reject(not path.is_file(), path, "missing", "the manifest of a complete sequence", REDO)
     manifest = _read(path, _Manifest, REDO)
-    if manifest.get("streams") and manifest["sequence"]["image_size"] is None:
-        expected = "the size of the pictures"
-        raise InputError(file=path, place="sequence.image_size", got="null", expected=expected, remedy=REDO)
+    unsized = manifest.get("streams") and manifest["sequence"]["image_size"] is None
+    reject(unsized, path, "null", "the size of the pictures", REDO, "sequence.image_size")
     return manifest
 
 
@@ -218,14 +216,12 @@ def read_whole_manifest(folder: Path) -> dict[str, Any]:
         wanted += [file_name(stream, images, k) for k in range(1, count + 1)]
     expected = "every file of the sequence"
     first, *more = [name for name in wanted if name not in manifest["files"]] or [""]
-    if first:
-        got = f"no {first}" + (f" and {len(more)} more" if more else "")
-        raise InputError(file=folder / MANIFEST, place="files", got=got, expected=expected, remedy=REDO)
+    got = f"no {first}" + (f" and {len(more)} more" if more else "")
+    reject(first, folder / MANIFEST, got, expected, REDO, "files")
     # A stranger's dataset must not make an export read files elsewhere.
+    got, remedy = "a link that leads out of the sequence", "export a copy that holds the files (cp -rL)"
     for path in (folder / name for name in (MANIFEST, *manifest["files"])):
-        if not path.resolve().is_relative_to(folder.resolve()):
-            got, remedy = "a link that leads out of the sequence", "export a copy that holds the files (cp -rL)"
-            raise InputError(file=path, got=got, expected=expected, remedy=remedy)
+        reject(not path.resolve().is_relative_to(folder.resolve()), path, got, expected, remedy)
     return manifest
 
 
@@ -254,9 +250,8 @@ def reject_foreign(folder: Path) -> None:
 def reject_dataset(folder: Path) -> None:
     """Raises InputError if `folder` is a dataset or lies in a stored sequence, where no tracks or tables belong."""
     place = next((p for p in (folder.absolute(), *folder.absolute().parents) if is_ours(p / MANIFEST, MARKS)), None)
-    if place is not None or is_dataset(folder):
-        got = "a generated dataset" if place is None else f"a place inside the stored sequence {place.name}"
-        raise InputError(file=folder, got=got, expected=FOR_RUNS, remedy=ANOTHER)
+    got = "a generated dataset" if place is None else f"a place inside the stored sequence {place.name}"
+    reject(place is not None or is_dataset(folder), folder, got, FOR_RUNS, ANOTHER)
 
 
 def reject_runs(folder: Path) -> None:
@@ -267,9 +262,8 @@ def reject_runs(folder: Path) -> None:
 
 def reject_sealed(folder: Path) -> None:
     """Raises InputError if `folder` is that of a run or of a stored sequence, into which no export is written."""
-    if is_run(folder) or is_ours(folder / MANIFEST, MARKS):
-        got = "a folder of tracks or of a sequence"
-        raise InputError(file=folder, place="--out", got=got, expected="another folder", remedy=ANOTHER)
+    sealed = is_run(folder) or is_ours(folder / MANIFEST, MARKS)
+    reject(sealed, folder, "a folder of tracks or of a sequence", "another folder", ANOTHER, "--out")
 
 
 def sealed_run(info: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
@@ -282,9 +276,8 @@ def sealed_run(info: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
 
 def read_run(folder: Path) -> dict[str, Any]:
     """Returns the run.json of a folder, with its own hash checked; no other file is read."""
-    if not (folder / RUN).is_file():
-        got, expected = f"tracks without {RUN}", "a run that was finished"
-        raise InputError(file=folder, got=got, expected=expected, remedy=f"incomplete: {AGAIN}")
+    got, expected = f"tracks without {RUN}", "a run that was finished"
+    reject(not (folder / RUN).is_file(), folder, got, expected, f"incomplete: {AGAIN}")
     return _read(folder / RUN, _Run, AGAIN)
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError, printable
+from scenarios.errors import InputError, printable, reject
 from sim import hashing
 from sim.hashing import versions
 from sim.pictures.background_sample import BackgroundChoice, BackgroundSample
@@ -148,9 +148,7 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
     load_background, words = _background(pictures, background, length)
 
     def require_length(name: str, found: int) -> None:
-        if found != length:
-            expected = f"{length} frames, as manifest.json says"
-            raise InputError(file=folder / name, got=f"{found} frames", expected=expected, remedy=REDO)
+        reject(found != length, folder / name, f"{found} frames", f"{length} frames, as manifest.json says", REDO)
 
     @lru_cache(maxsize=1)
     def detections() -> list[Detections]:
@@ -189,9 +187,8 @@ def _background(
 ) -> tuple[Callable[[], Image] | None, dict[str, str]]:
     """Returns (loader of background pictures, entry for `Sequence.source`); (None, {}) if there are none."""
     if choice is not None:
-        if "left" not in pictures.streams:
-            got, remedy = "--background", "leave it out: it has none"
-            raise InputError(file=pictures.folder, got=got, expected="none for one without pictures", remedy=remedy)
+        remedy = "leave it out: it has none"
+        reject("left" not in pictures.streams, pictures.folder, "--background", "none for one without pictures", remedy)
         fits = choice.of(length, pictures.folder, pictures.size)
         return BackgroundSample(fits, length, pictures.folder, pictures.sample), {"background": str(fits)}
     if "background" not in pictures.streams:

@@ -16,14 +16,15 @@ from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError, create_model
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import COORDINATE, FRAME_RATES, FRAMES, INTEGER, JSON_BYTES, SCALES
 from scenarios.reading import parse_json, require_regular
 from sim.types import Array, Ints
 
 M = TypeVar("M", bound=BaseModel)
+T = TypeVar("T")
 
 # Numbers of JSON files. pydantic takes lists for tuples; numbers are strict, so that no text or bool is one.
 Number = Annotated[float, Field(strict=True, ge=-COORDINATE, le=COORDINATE)]
@@ -108,8 +109,7 @@ class StoredTable:
         return [np.asarray(v, kind) for v in column]
 
     def _numbers(self, name: str, kinds: str, expected: str) -> NDArray[Any]:
-        if name not in self.columns:
-            raise InputError(file=self.file, got=f"no column {name}", expected="that column", remedy=REDO)
+        reject(name not in self.columns, self.file, f"no column {name}", "that column", REDO)
         column = self.columns[name]
         self.reject(column.dtype.kind not in kinds, name, f"a column of {column.dtype}", expected)
         return column
@@ -127,8 +127,7 @@ class StoredTable:
 
     def reject(self, wrong: bool, place: str, got: str, expected: str) -> None:
         """Raises InputError about a place in this file if `wrong` is True."""
-        if wrong:
-            raise InputError(file=self.file, place=place, got=got, expected=expected, remedy=REDO)
+        reject(wrong, self.file, got, expected, REDO, place)
 
 
 def table_bytes(columns: Columns, facts: dict[str, Any], units: Mapping[str, str]) -> bytes:
@@ -235,18 +234,28 @@ def read_json(path: Path, remedy: str = REDO) -> dict[str, Any]:
     from sim.store.numeric_text import read_text
 
     value = parse_json(read_text(path, JSON_BYTES), path, remedy)
-    if not isinstance(value, dict):
-        raise InputError(file=path, got=type(value).__name__, expected="a JSON object", remedy=remedy)
-    return value
+    reject(not isinstance(value, dict), path, type(value).__name__, "a JSON object", remedy)
+    found: dict[str, Any] = value
+    return found
 
 
 def read_document(path: Path, remedy: str = REDO) -> dict[str, Any]:
     """Returns the JSON object in a file of ours; InputError for another "format" than 1, which may be missing."""
     value = read_json(path, remedy)
     found = value.get("format", FORMAT)
-    if found != FORMAT or isinstance(found, bool):
-        raise InputError(file=path, place="format", got=repr(found), expected=FORMAT, remedy="use the same version")
+    other = found != FORMAT or isinstance(found, bool)
+    reject(other, path, repr(found), FORMAT, "use the same version", "format")
     return value
+
+
+def read_items(path: Path, name: str, kind: type[T], remedy: str, missing: Any = ...) -> T:
+    """Returns the items under the key `name` of a JSON file, as `json_list` writes it; InputError for wrong values.
+
+    kind: of all items, as list[Event]. missing: what stands for a missing key; by default the key must be there.
+    """
+    form = create_model("Items", **{name: (kind, missing)})  # type: ignore[call-overload]
+    found: T = getattr(validated(path, read_document(path), form, remedy), name)
+    return found
 
 
 def none_to_nan(value: float | None) -> float:

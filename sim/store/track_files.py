@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from sim.arrays import repeated_ids
 from sim.scene.body import PERSON_HEIGHT
 from sim.store import group_files, tables
@@ -279,8 +279,7 @@ def with_events(found: list[Tracks], folder: Path) -> list[Tracks]:
     by_frame: dict[int, list[GroupEvent]] = {}
     for k, (event, frame) in enumerate(group_files.read_events(path)):
         at = next(index for index in (frame, event.emitted, event.end) if index is not None)
-        if not first <= at <= last:
-            got, expected = f"an event reported in frame {at}", f"a frame from {first} to {last}, as the tracks have"
-            raise InputError(file=path, place=f"events[{k}]", got=got, expected=expected, remedy="correct the event")
+        got, expected = f"an event reported in frame {at}", f"a frame from {first} to {last}, as the tracks have"
+        reject(not first <= at <= last, path, got, expected, "correct the event", f"events[{k}]")
         by_frame.setdefault(at, []).append(event)
     return [t.replace(events=tuple(by_frame[t.index])) if t.index in by_frame else t for t in found]

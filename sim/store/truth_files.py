@@ -17,22 +17,11 @@ from pydantic import BaseModel
 
 from scenarios.errors import InputError
 from scenarios.reading import is_present
+from sim.arrays import joined
 from sim.scene.terrain import height_at
 from sim.store import group_files, tables
 from sim.store.seal import REDO
-from sim.store.tables import (
-    AXES,
-    BOX,
-    VISIBLE,
-    Columns,
-    Count,
-    FrameNumber,
-    Rate,
-    Scale,
-    StoredTable,
-    along,
-    read_table,
-)
+from sim.store.tables import AXES, BOX, VISIBLE, Count, FrameNumber, Rate, Scale, StoredTable, along, read_table
 from sim.types import Array, Bools, Detections, Groups, Ints, Order, Scene, Truth
 
 
@@ -59,7 +48,7 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
 
 
 def _table(truth: Truth) -> bytes:
-    columns: Columns = {
+    columns: tables.Columns = {
         "frame": truth.frame, "id": truth.id, "group": truth.group, ("x", "y"): truth.pos, ("vx", "vy"): truth.vel,
         BOX: truth.box, VISIBLE: truth.visible_box, "visibility": truth.visibility, "z": truth.z,
         "heading": truth.heading, "height": truth.height, "truncation": truth.truncation,
@@ -133,7 +122,10 @@ def read_truth(folder: Path) -> Truth:
     facts = table.facts_as(_TruthFacts)
     length = facts.length
     frame, id = table.ints("frame"), table.ints("id")
-    _check_rows(table, length)
+    table.cuts(1, length)
+    twice = (np.diff(frame) == 0) & (np.diff(id) <= 0)
+    place = f"row {int(np.argmax(twice)) + 1}" if len(twice) else ""
+    table.reject(bool(twice.any()), place, "rows out of order, or twice", "rows sorted by (frame, id)")
     events = group_files.read_events(gt / "events.json") if is_present(gt / "events.json") else None
     return Truth(
         name=facts.name, fps=facts.fps, length=length, px_per_m=tables.none_to_nan(facts.px_per_m),
@@ -147,13 +139,6 @@ def read_truth(folder: Path) -> Truth:
         near=group_files.read_near(gt / "near.csv") if is_present(gt / "near.csv") else None,
         orders=group_files.read_script(gt / "script.json"),
     )  # fmt: skip
-
-
-def _check_rows(table: StoredTable, length: int) -> None:
-    table.cuts(1, length)
-    twice = (np.diff(table.ints("frame")) == 0) & (np.diff(table.ints("id")) <= 0)
-    place = f"row {int(np.argmax(twice)) + 1}" if len(twice) else ""
-    table.reject(bool(twice.any()), place, "rows out of order, or twice", "rows sorted by (frame, id)")
 
 
 def _groups(path: Path) -> tuple[Groups, ...] | None:
@@ -172,12 +157,14 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
     assert len(forms) <= 1, f"detections of one sequence differ in kind: {sorted(forms)}"
     plane, boxed, moving = next(iter(forms), ("image", True, False))
     axes = AXES[: detections[0].pos.shape[1]] if detections else AXES[:2]
-    pos = np.concatenate([np.zeros((0, len(axes))), *(d.pos for d in detections)])
-    score = np.concatenate([np.zeros(0), *(scores_or_ones(d.score, len(d.pos)) for d in detections)])
+    pos, score = (
+        joined((d.pos for d in detections), len(axes)),
+        joined(scores_or_ones(d.score, len(d.pos)) for d in detections),
+    )
     frame = np.repeat(np.arange(1, len(detections) + 1, dtype=np.int64), [len(d.pos) for d in detections])
     vel = np.concatenate([d.vel for d in detections if d.vel is not None]) if moving else None
     box = np.concatenate([d.box for d in detections if d.box is not None]) if boxed else None
-    columns: Columns = {"frame": frame, axes: pos, "score": score, along(axes): vel, BOX: box}
+    columns: tables.Columns = {"frame": frame, axes: pos, "score": score, along(axes): vel, BOX: box}
     facts = {"plane": plane, "frames": len(detections), "fps": fps}
     rest = score_and_place(score, None if plane == "image" else with_ground_height(pos, scene))
     # An alarm at the picture's edge may be a box without width.

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from sim import hashing
 from sim.dataset.splits import split_of
 from sim.scene.visibility import image_size_of_boxes
@@ -54,9 +54,7 @@ def coco(source: str | Path, out: str | Path, *, person_class: int | str | None 
     reject_sealed(out.parent)
     every = open_source(source, person_class=person_class)
     sequences = [s for s in every if s.truth is not None and s.truth.box is not None]
-    if not sequences:
-        expected, remedy = "a dataset with boxes", "give a generated dataset"
-        raise InputError(file=source, got="no labelled boxes", expected=expected, remedy=remedy)
+    reject(not sequences, source, "no labelled boxes", "a dataset with boxes", "give a generated dataset")
     made = [s.source for s in sequences if s.source.get("kind") == "generated"]
     splits = sorted({split_of(range(facts["seed"], facts["seed"] + 1)) for facts in made})
     if len(splits) > 1:

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import COORDINATE
 from sim.arrays import no_ids
 from sim.geometry.polygons import cross
@@ -178,9 +178,8 @@ def write_tables(tables: TidyTables, folder: Path, form: Form, facts: Mapping[st
     """
     if form in TEXTS:
         name, beginning = TEXTS[form]
-        if "x_m" not in tables.people.columns:
-            got, expected = "people in the image, px", "positions on the ground, m"
-            raise InputError(file=folder, got=got, expected=expected, remedy="track with --camera, or from points")
+        got, expected = "people in the image, px", "positions on the ground, m"
+        reject("x_m" not in tables.people.columns, folder, got, expected, "track with --camera, or from points")
         body = (trajnet_text if form == "trajnet" else pedpy_text)(tables, facts["fps"])
         _refuse_foreign(folder / name, beginning)
         write_file(folder / name, body.encode())

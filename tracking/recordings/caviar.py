@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import COORDINATE, FRAMES
 from sim.arrays import repeated_ids
 from sim.geometry.boxes import centres
@@ -35,10 +35,9 @@ SMALLEST = 1e-6  # px: least width and height of a box
 def read_xml(path: Path) -> ET.Element:
     """Returns the root of the CAVIAR file (CVML) `path`."""
     root = xml_root(path, "a CAVIAR file (CVML)", "fetch the file again")
-    if root.tag != "dataset" or root.find("frame") is None:
-        remedy = f"give another file; if it holds rows of people, write them as .csv, and {NAME_THEM}"
-        got = "no <frame> in <dataset>" if root.tag == "dataset" else f"<{root.tag}>"
-        raise InputError(file=path, got=got, expected="<dataset> of CAVIAR (CVML)", remedy=remedy)
+    remedy = f"give another file; if it holds rows of people, write them as .csv, and {NAME_THEM}"
+    got = "no <frame> in <dataset>" if root.tag == "dataset" else f"<{root.tag}>"
+    reject(root.tag != "dataset" or root.find("frame") is None, path, got, "<dataset> of CAVIAR (CVML)", remedy)
     return root
 
 
@@ -110,9 +109,8 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     rate = options.fps or FPS
     if own:
         options.reject(path, "a CAVIAR recording", "its boxes do not show where people stand", "camera")
-    if options.fps is None and not own:
-        got, expected = "labels without frame rate, not of CAVIAR's recordings", "the frames per second of the video"
-        raise InputError(file=path, place="--fps", got=got, expected=expected, remedy="give --fps")
+    got = "labels without frame rate, not of CAVIAR's recordings"
+    reject(options.fps is None and not own, path, got, "the frames per second of the video", "give --fps", "--fps")
     if options.fps is None:
         # The text names no path, so that a command over many recordings prints it once.
         words = f"CAVIAR's recordings are taken at {FPS:g} fps, with pictures of {IMAGE_SIZE[0]}×{IMAGE_SIZE[1]} px"

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.reading import is_present
@@ -89,9 +89,8 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     pictures = _find_pictures(path, info)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
     length = info.length or max(_labelled_frames(path).max(initial=0).item(), pictures.last)
-    if not length:
-        expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
-        raise InputError(file=path, got="nothing that tells its length", expected=expected, remedy="complete it")
+    expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
+    reject(not length, path, "nothing that tells its length", expected, "complete it")
     beyond = [file.name for frame, file in pictures.files.items() if frame > length]
     if beyond and len(pictures.files) <= length:
         got, expected = f"{beyond[0]} among {len(pictures.files)} pictures", f"frames 1 to {length}"

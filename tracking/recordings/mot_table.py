@@ -21,7 +21,7 @@ from typing import NoReturn
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from sim.arrays import repeated_ids
 from sim.store.numeric_text import CORRECT, NAME_THEM, NumericTable, TextRows, is_number_text, read_rows
 from sim.types import LENGTH_UNITS, Array, Bools, Ints
@@ -88,10 +88,9 @@ def reject_swapped(rows: NumericTable) -> None:
     """
     known = rows.values[rows.values[:, 1] >= 0]
     as_read, swapped = (_usual_steps(known[:, [*columns, 2, 3]]) for columns in ((1, 0), (0, 1)))
-    if (swapped + LEAST < SWAPPED * as_read).all():
-        got = f"steps of {as_read[0]:.3g}, but of {swapped[0]:.3g} if frame and id change places"
-        expected, remedy = "the frame first", "exchange columns 1 and 2, or name the columns in the first line"
-        raise InputError(file=rows.file, place="columns", got=got, expected=expected, remedy=remedy)
+    got = f"steps of {as_read[0]:.3g}, but of {swapped[0]:.3g} if frame and id change places"
+    remedy = "exchange columns 1 and 2, or name the columns in the first line"
+    reject((swapped + LEAST < SWAPPED * as_read).all(), rows.file, got, "the frame first", remedy, "columns")
 
 
 def _usual_steps(rows: Array) -> Array:

@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.geometry.boxes import centres
@@ -190,17 +190,14 @@ def labelled_people(table: MotTable, person_class: Classes | None) -> Bools:
     person_class: the classes of people; None: 1, or PEOPLE if classes are words, with a warning about other classes.
     """
     keep, file = np.asarray(table.id >= 0), table.rows.file
-    if len(keep) and not keep.any():
-        got, remedy = f"negative ids in all {len(keep)} rows", "give each person an id"
-        raise InputError(file=file, place="column 2", got=got, expected="ids from 0", remedy=remedy)
+    got = f"negative ids in all {len(keep)} rows"
+    reject(len(keep) and not keep.any(), file, got, "ids from 0", "give each person an id", "column 2")
     flag = table.scores()
     # Column 7 of another text may be a confidence.
     if file.name == LABELS or (np.isin(flag, (0, 1, -1)).all() and flag.any()):
         keep &= flag != 0
-        if len(keep) and not keep.any():
-            got, expected = f"0 in all {len(keep)} rows, which leaves nobody", "another flag than 0 for people"
-            remedy = "write 1 in column 7 of rows that count"
-            raise InputError(file=file, place="column 7", got=got, expected=expected, remedy=remedy)
+        got, remedy = f"0 in all {len(keep)} rows, which leaves nobody", "write 1 in column 7 of rows that count"
+        reject(len(keep) and not keep.any(), file, got, "another flag than 0 for people", remedy, "column 7")
     return of_class(table, keep, person_class)
 
 
@@ -224,9 +221,8 @@ def of_class(table: MotTable, keep: Bools, person_class: Classes | None) -> Bool
     counts = np.bincount(row[keep & ~people], minlength=len(name))
     others = [f"{n} rows of class {each}" for each, n in zip(name, counts, strict=True) if n]
     said, people_are = ", ".join(others[:SHOWN]) + ", …" * (len(others) > SHOWN), " or ".join(wanted)
-    if not people.any():
-        remedy = "name the classes of people with --class, those of labels and tracks, as 0,1"
-        raise InputError(file=file, place="classes", got=said, expected=f"people, of class {people_are}", remedy=remedy)
+    remedy = "name the classes of people with --class, those of labels and tracks, as 0,1"
+    reject(not people.any(), file, said, f"people, of class {people_are}", remedy, "classes")
     if others and person_class is None:
         text = f"{file}: {said} are left out; people are class {people_are} (--class says otherwise)"
         warnings.warn(text, stacklevel=3)
@@ -425,10 +421,9 @@ def rate_of_times(path: Path, seconds: Array, id: Array) -> float:
     """Returns the frames per second at which times (N,) of one id (N,) follow each other, where none is missing."""
     step = usual_step(seconds, id)
     rate = 1 / step if step else 1.0
-    if not RATES[0] <= rate <= RATES[1]:
-        got, expected = f"{rate:.3g} per second", "{:g} to {:g} times per second".format(*RATES)
-        remedy = "correct the unit in the name of the column (t_s, t_ms, t_us, t_ns), or give --fps"
-        raise InputError(file=path, place="times", got=got, expected=expected, remedy=remedy)
+    expected = "{:g} to {:g} times per second".format(*RATES)
+    remedy = "correct the unit in the name of the column (t_s, t_ms, t_us, t_ns), or give --fps"
+    reject(not RATES[0] <= rate <= RATES[1], path, f"{rate:.3g} per second", expected, remedy, "times")
     return round(float(rate), 3)
 
 
@@ -451,8 +446,7 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
     table = read_table(path, boxless=True, box_scale=of_boxes.box_scale, frames_at=frames_at, px_per_m=options.px_per_m)
     rate = frame_rate(fps, None)
-    if not len(table.frame):
-        raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
+    reject(not len(table.frame), path, "no row", "people or detections", "check the file")
     length = int(table.frame.max())
 
     def truth() -> Truth:

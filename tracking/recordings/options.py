@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import PICTURE_SIDE
 from sim.pictures.background_sample import BackgroundChoice
 from sim.store.numeric_text import number_or_nan
@@ -57,9 +57,8 @@ def refuse_options(values: Mapping[str, Any], names: str, path: Path, kind: str,
     """Raises InputError if an option in `names` ("camera fps") is given, because it has no effect on a `kind`."""
     found = [name for name in names.split() if values[name] is not None and values[name] is not False]
     given = [f"--{name.removeprefix('person_').replace('_', '-')}" for name in found]
-    if given:
-        remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
-        raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
+    remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
+    reject(given, path, " and ".join(given), f"none for {kind}", remedy)
 
 
 NO_OPTIONS = RecordingOptions()

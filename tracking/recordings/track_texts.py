@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import FRAMES
 from sim.geometry.boxes import centres
 from sim.store import group_files
@@ -67,9 +67,8 @@ def read_checked_tracks(
     if whole and run_folder(path) is not None:
         return read_run(folder)
     text = folder / "tracks.txt" if path.is_dir() else path
-    if not text.is_file():
-        got, expected = "no tracks", "tracks.parquet, tracks.txt or a MOTChallenge text"
-        raise InputError(file=path, got=got, expected=expected, remedy="give the folder that `flockscope track` made")
+    expected = "tracks.parquet, tracks.txt or a MOTChallenge text"
+    reject(not text.is_file(), path, "no tracks", expected, "give the folder that `flockscope track` made")
     found = read_track_text(text, 25.0 if fps is None else fps, length, person_class, box_scale, px_per_m, begin)
     if not whole:
         return found
