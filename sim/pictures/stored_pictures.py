@@ -59,7 +59,11 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
             for name in wanted if streams.suffix(name, images) == "mp4"
         }  # fmt: skip
 
-        def add(name: str, picture: NDArray[Any]) -> None:
+        def add(name: str, picture: NDArray[Any] | None) -> None:
+            if picture is None:
+                got, remedy = "a sequence without it", "leave the stream out, or give its camera a baseline"
+                file, expected = sequence.name, "a sequence with that stream"
+                raise InputError(file=file, place=f"--streams {name}", got=got, expected=expected, remedy=remedy)
             hashes[name].add(picture)
             if name in movies:
                 movies[name].add(picture)
@@ -68,9 +72,7 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
                 atomic.write_inside(folder / streams.file_name(name, images, hashes[name].count), body)
 
         empty = sequence.background() if "background" in wanted else ()
-        if empty is None:
-            raise _missing(sequence, "background")
-        for picture in empty:
+        for picture in (None,) if empty is None else empty:
             add("background", picture)
         for frame in sequence if {"left", "right"} & hashes.keys() else sequence.without_pictures():
             pixels = None if sequence.load_pixels is None else sequence.load_pixels(frame.index)
@@ -83,23 +85,13 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
     return {name: pixels.hex() for name, pixels in hashes.items()}
 
 
-def _picture(name: str, sequence: Sequence, frame: Frame, pixels: PixelTruth | None) -> NDArray[Any]:
-    """Returns a frame's picture of a stream; InputError without one."""
-    picture: NDArray[Any] | None = {"left": frame.image, "right": frame.right}.get(name)
+def _picture(name: str, sequence: Sequence, frame: Frame, pixels: PixelTruth | None) -> NDArray[Any] | None:
+    """Returns a frame's picture of a stream; None without one."""
     if name == "ids" and pixels is not None:
-        picture = streams.encode_ids(pixels.ids)
+        return streams.encode_ids(pixels.ids)
     if name == "disparity" and pixels is not None and pixels.disparity is not None:
-        picture = streams.encode_disparity(pixels.disparity, sequence.camera)
-    if picture is None:
-        raise _missing(sequence, name)
-    return picture
-
-
-def _missing(sequence: Sequence, stream: str) -> InputError:
-    return InputError(
-        file=sequence.name, place=f"--streams {stream}", got="a sequence without it",
-        expected="a sequence with that stream", remedy="leave the stream out, or give its camera a baseline",
-    )  # fmt: skip
+        return streams.encode_disparity(pixels.disparity, sequence.camera)
+    return {"left": frame.image, "right": frame.right}.get(name)
 
 
 def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
@@ -139,10 +131,6 @@ class StoredPictures:
         """File type of the pictures; "png" if there are none, or only 16-bit streams (ids, disparity)."""
         return self.manifest.get("images") or "png"
 
-    def body(self, name: str) -> bytes:
-        """Returns the bytes of a file; raises InputError if they differ from the hash in the manifest."""
-        return self.check(name, whole=True)
-
     def check(self, name: str, whole: bool = False) -> bytes:
         """Raises InputError if a file differs from its hash in the manifest. Returns its bytes if `whole`, else b""."""
         path, files = self.folder / name, self.manifest["files"]
@@ -155,7 +143,7 @@ class StoredPictures:
 
         name = streams.file_name(stream, self.images, index)
         mode = cv2.IMREAD_UNCHANGED if stream in streams.EXACT else cv2.IMREAD_COLOR
-        body = self.body(name)
+        body = self.check(name, whole=True)
         picture = cv2.imdecode(np.frombuffer(body, np.uint8), mode) if body else None  # OpenCV refuses no bytes
         if picture is None or picture.dtype != (np.uint16 if stream in streams.EXACT else np.uint8):
             raise InputError(file=self.folder / name, got="no readable picture", expected="a picture", remedy=REDO)

@@ -127,9 +127,8 @@ def _seqinfo(sequence: Sequence, length: int, images: str | None) -> bytes:
     lines = ["[Sequence]", f"name={printable(sequence.name)}", "imDir=img1"]
     lines += [f"frameRate={str(sequence.fps).removesuffix('.0')}", f"seqLength={length}"]
     if sequence.image_size is not None:
-        suffix = ".png" if images == "png" else ".jpg"
-        lines += ["imWidth={}".format(*sequence.image_size), "imHeight={1}".format(*sequence.image_size)]
-        lines.append(f"imExt={suffix}")
+        width, height = sequence.image_size
+        lines += [f"imWidth={width}", f"imHeight={height}", f"imExt={'.png' if images == 'png' else '.jpg'}"]
     return "\n".join([*lines, ""]).encode()
 
 

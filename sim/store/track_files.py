@@ -19,7 +19,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from scenarios.errors import InputError, reject
-from sim.arrays import repeated_ids
+from sim.arrays import joined, repeated_ids
 from sim.scene.body import PERSON_HEIGHT
 from sim.store import group_files, tables
 from sim.store.atomic import lock_folder, replace_sealed
@@ -84,10 +84,6 @@ def flatten(every: list[Tracks]) -> RunRows:
     plane, unit = next(iter(kinds), ("ground", "person"))
     d = 3 if plane == "space" else 2
     counts = [len(t.id) for t in every]
-
-    def joined(values: Iterable[Any], *shape: int, kind: type = np.float64) -> Any:
-        return np.concatenate([np.zeros((0, *shape), kind), *values])
-
     return RunRows(
         plane, unit, np.repeat(np.array([t.index for t in every], np.int64), counts),
         joined((t.id for t in every), kind=np.int64), joined((t.group for t in every), kind=np.int64),

@@ -31,7 +31,7 @@ import numpy as np
 
 from scenarios.errors import InputError, reject
 from scenarios.limits import COORDINATE
-from sim.arrays import no_ids
+from sim.arrays import joined, no_ids
 from sim.geometry.polygons import cross
 from sim.store.atomic import write_file
 from sim.store.numeric_text import number_or_nan
@@ -260,16 +260,11 @@ def _group_rows(rows: _Rows) -> tuple[Ints, Ints, Array, tuple[Ints, Ints, Ints]
     """Returns frame, id and size of each group in each frame (G,), and (frame, group, id) of each member (M,)."""
     every = list(zip(rows.listed.tolist(), rows.groups or (), strict=False))
     frame = np.repeat(np.array([k for k, _ in every], np.int64), [len(g.id) for _, g in every])
-    group = _joined([g.id for _, g in every], np.int64)
-    size = _joined([g.size for _, g in every], np.float64)
+    group, size = joined((g.id for _, g in every), kind=np.int64), joined(g.size for _, g in every)
     listed = [(k, name, m) for k, g in every for name, m in zip(g.id.tolist(), g.members, strict=False)]
     counts = [len(m) for *_, m in listed]
     when, name = (np.repeat(np.array([item[k] for item in listed], np.int64), counts) for k in (0, 1))
-    return frame, group, size, (when, name, _joined([m for *_, m in listed], np.int64))
-
-
-def _joined(parts: list[Any], kind: type) -> Any:
-    return np.concatenate([np.zeros(0, kind), *parts]).astype(kind)
+    return frame, group, size, (when, name, joined((m for *_, m in listed), kind=np.int64))
 
 
 def _span(rows: _Rows, first: Ints, last: Ints) -> dict[str, Any]:

@@ -130,4 +130,4 @@ def _members(folder: Path) -> Iterator[tuple[str, bytes]]:
     stored = StoredPictures(folder, read_whole_manifest(folder))
     yield f"{_key(folder)}.{MANIFEST}", (folder / MANIFEST).read_bytes()
     for name in stored.manifest["files"]:
-        yield f"{_key(folder)}.{name.replace('/', '.')}", stored.body(name)
+        yield f"{_key(folder)}.{name.replace('/', '.')}", stored.check(name, whole=True)

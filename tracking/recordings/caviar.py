@@ -32,15 +32,6 @@ IMAGE_SIZE = (384, 288)
 SMALLEST = 1e-6  # px: least width and height of a box
 
 
-def read_xml(path: Path) -> ET.Element:
-    """Returns the root of the CAVIAR file (CVML) `path`."""
-    root = xml_root(path, "a CAVIAR file (CVML)", "fetch the file again")
-    remedy = f"give another file; if it holds rows of people, write them as .csv, and {NAME_THEM}"
-    got = "no <frame> in <dataset>" if root.tag == "dataset" else f"<{root.tag}>"
-    reject(root.tag != "dataset" or root.find("frame") is None, path, got, "<dataset> of CAVIAR (CVML)", remedy)
-    return root
-
-
 def people_of(path: Path, root: ET.Element) -> tuple[MotTable, int]:
     """Returns the people in a CAVIAR file, sorted by (frame, id), and its number of frames.
 
@@ -100,7 +91,10 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     boxes / 1.7 m, that of the sequence the median of the first 100; `source["px_per_m_frames"]` is then the last frame
     of these boxes. `options.camera` is refused for CAVIAR's own recordings.
     """
-    root, px_per_m = read_xml(path), options.px_per_m
+    root, px_per_m = xml_root(path, "a CAVIAR file (CVML)", "fetch the file again"), options.px_per_m
+    remedy = f"give another file; if it holds rows of people, write them as .csv, and {NAME_THEM}"
+    got = "no <frame> in <dataset>" if root.tag == "dataset" else f"<{root.tag}>"
+    reject(root.tag != "dataset" or root.find("frame") is None, path, got, "<dataset> of CAVIAR (CVML)", remedy)
     table, length = people_of(path, root)
     name, sides, centre = root.get("name", path.stem), table.box[:, 2:].max(axis=1), centres(table.box)
     # CAVIAR's own recordings have hypotheses about what people do, and all boxes lie in CAVIAR's pictures.

@@ -83,7 +83,8 @@ def labelled_truth_fields(
     intent = np.where(label >= 0, label, label.max(initial=0) + 1 + column)
     meant, rows = (MotionRows.of(frame - 1, column, metres, speed, g, length) for g in (intent, label))
     measured = groups_and_events(meant, fps)
-    names = _names(measured.group[meant.find(column, frame - 1)], label)
+    distinct = zip(*np.unique(measured.group[meant.find(column, frame - 1)], return_index=True), strict=True)
+    names = {int(g): int(label[k]) for g, k in distinct if g >= 0}
     found = [_named(e, names, people, px_per_m) for e in measured.events]
     met = crossings(rows, fps) + queues(rows, fps)
     found += [_named(e, {}, people, px_per_m) for e in met]
@@ -116,11 +117,6 @@ def with_labels(truth: Truth, label: Ints) -> Truth:
     known = labelled_truth_fields(*rows, pos, vel, fps=fps, length=length, px_per_m=truth.px_per_m)
     shapes = box_groups(*rows, pos, vel, truth.box, 1, length)
     return truth.replace(**{**known, "groups": None}, groups_px=tuple(shapes))
-
-
-def _names(measured: Ints, label: Ints) -> dict[int, int]:
-    found, first = np.unique(measured, return_index=True)
-    return {int(g): int(label[k]) for g, k in zip(found, first, strict=True) if g >= 0}
 
 
 def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: float) -> GroupEvent:

@@ -16,6 +16,7 @@ from scenarios.errors import InputError, reject
 from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.reading import is_present
+from sim.arrays import joined
 from sim.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.pictures.picture_folder import PictureFolder, fill_gaps, find_pictures, find_right_pictures
 from sim.scene.camera import scaled_to_image
@@ -116,12 +117,12 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         there = images and pictures.files and folder.files
         return (lambda: fill_gaps(folder.read(every, seen), length, name)) if there else None
 
-    def sample(wanted: list[int]) -> Iterator[tuple[int, Image]]:
-        return pictures.read(wanted, seen or pictures.first_size())
-
     def truth() -> Truth:
         table = read_table(gt, length=length, boxless=True, px_per_m=options.px_per_m)
         return mot_text.truth_of_table(table, info.name, rate, length, options.scale, of_boxes.person_class)
+
+    def sample(wanted: list[int]) -> Iterator[tuple[int, Image]]:
+        return pictures.read(wanted, seen or pictures.first_size())
 
     more: dict[str, Any] = {} if choice is None else {"background": str(choice)}
     more |= {} if pictures.numbering is None else {"numbering": astuple(pictures.numbering)}
@@ -150,10 +151,6 @@ def _find_pictures(path: Path, info: SeqInfo) -> PictureFolder:
     return find_pictures(path / info.image_dir, info.length, (lambda: _labelled_frames(path)) if texts else None)
 
 
-def _frames(text: Path) -> Ints:
-    return read_table(text, boxless=True, px_per_m=1.0).frame
-
-
 def _labelled_frames(path: Path) -> Ints:
     texts = filter(is_present, (path / "det" / "det.txt", path / "gt" / "gt.txt"))
-    return np.unique(np.concatenate([np.zeros(0, np.int64), *(_frames(text) for text in texts)]))
+    return np.unique(joined((read_table(text, boxless=True, px_per_m=1.0).frame for text in texts), kind=np.int64))

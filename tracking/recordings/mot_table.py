@@ -26,7 +26,7 @@ from sim.arrays import repeated_ids
 from sim.store.numeric_text import CORRECT, NAME_THEM, NumericTable, TextRows, is_number_text, read_rows
 from sim.types import LENGTH_UNITS, Array, Bools, Ints
 from tracking.recordings.options import BoxScale
-from tracking.recordings.worded_cells import TIME_UNITS, are_numbers, in_seconds, instants, numbered
+from tracking.recordings.worded_cells import TIME_UNITS, in_seconds, instants, numbered
 
 ENOUGH = 10  # rows that are needed to judge by how their columns vary
 
@@ -226,8 +226,11 @@ def read_named(
     if words:
         classes, code = np.unique(words, return_inverse=True)
         rows, column["class"] = replace(rows, classes=tuple(classes.tolist())), code.astype(float)
-    if "lost" in column:
-        rows, column = _without_lost(rows, column)
+    lost = column.get("lost", np.zeros(0)) != 0
+    if lost.any():
+        said = f"{lost.sum()} of {len(lost)} rows are lost people, whom nobody saw, and are left out"
+        warnings.warn(f"{rows.file}: column lost: {said}", stacklevel=4)
+        rows, column = _kept(rows, column, ~lost)
     if "time" in column and frames_at is not None:
         seconds, id = column.pop("time"), column.get("id", np.zeros(len(rows.line)))
         seconds = seconds if is_instant else in_seconds(text.file, names[found["time"]], seconds, id)
@@ -308,10 +311,8 @@ def _columns(text: TextRows, names: list[str], found: dict[str, int]) -> tuple[N
     try:
         rows = read()
     except InputError:
-        cells = {
-            meaning: text.words(found[meaning], first=1) for meaning in ("id", "group", "time") if meaning in found
-        }
-        worded |= {meaning: each for meaning, each in cells.items() if not are_numbers(each)}
+        cells = {m: text.words(found[m], first=1) for m in ("id", "group", "time") if m in found}
+        worded |= {m: each for m, each in cells.items() if not all(map(is_number_text, set(each)))}
         if not worded:
             raise
         rows = read()
@@ -323,14 +324,6 @@ def _columns(text: TextRows, names: list[str], found: dict[str, int]) -> tuple[N
     if "time" in worded:
         column["time"] = instants(rows, worded["time"])
     return rows, column, "time" in worded
-
-
-def _without_lost(rows: NumericTable, column: dict[str, Column]) -> tuple[NumericTable, dict[str, Column]]:
-    lost = column["lost"] != 0
-    if lost.any():
-        said = f"{lost.sum()} of {len(lost)} rows are lost people, whom nobody saw, and are left out"
-        warnings.warn(f"{rows.file}: column lost: {said}", stacklevel=5)
-    return _kept(rows, column, ~lost)
 
 
 def _kept(rows: NumericTable, column: dict[str, Column], keep: Bools) -> tuple[NumericTable, dict[str, Column]]:
@@ -356,11 +349,8 @@ def _in_order(
     """
     frame, have = column["frame"], {*column}
     used = have & {"frame", "id", "group", "lost"} | {"time"}
-    column = {
-        "id": np.full_like(frame, -1.0),
-        "class": np.full_like(frame, -1.0),
-        "score": np.ones_like(frame),
-    } | column
+    none = np.full_like(frame, -1.0)
+    column = {"id": none, "class": none, "score": np.ones_like(frame)} | column
     form = next((form for form in BOXES if have >= {*form} and (form != CORNERS or _are_corners(column))), None)
     place = next((place for place in PLACES if have >= {"id", *place}), None)
     if form is None and place is not None:
@@ -452,14 +442,14 @@ def read_table(
     first = next(text.cells(), [])
     if len(first) == len(STANFORD.split()) and first[-1].startswith('"') and is_number_text(first[0]):
         text = TextRows(path, (STANFORD, *text.text), np.insert(text.line, 0, 0))
-    named = column_names(text)
+    named, group = column_names(text), None
     if named is not None:
         rows, group = read_named(text, named, frames_at, px_per_m)
-        return table_of_rows(rows, length, boxless, box_scale, group)
-    rows = text.numbers((GROUND_COLUMNS, *range(6, 11)), layout=LAYOUT)
-    reject_missing_ids(rows)
-    reject_swapped(rows)
-    return table_of_rows(rows, length, boxless, box_scale)
+    else:
+        rows = text.numbers((GROUND_COLUMNS, *range(6, 11)), layout=LAYOUT)
+        reject_missing_ids(rows)
+        reject_swapped(rows)
+    return table_of_rows(rows, length, boxless, box_scale, group)
 
 
 def table_of_rows(

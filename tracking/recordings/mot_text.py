@@ -364,7 +364,7 @@ def truth_of_table(
 
     length: None: up to the last frame kept. px_per_m: nan: the boxes' median height / 1.7 m. Boxes are None if a row
     has none. Positions and velocities are None if no row has a position, else nan in rows without. Groups are those of
-    a column `group`, or of the file that `group_file` names.
+    a column `group`, or of a file: groups.txt beside gt.txt, NAME.groups.txt beside any other NAME.txt.
     """
     require_metres(table, fps)
     ground, boxless = _places(table)
@@ -397,13 +397,9 @@ def truth_of_table(
     warn_of_places(table.rows.file, truth)
     if table.group is not None:
         return with_labels(truth, table.group[order])
-    path = group_file(table.rows.file)
+    path = table.rows.file
+    path = path.with_name("groups.txt" if path.name == LABELS else f"{path.stem}.groups.txt")
     return with_labels(truth, labels_of(path, id)) if is_present(path) else truth
-
-
-def group_file(path: Path) -> Path:
-    """Returns the path of a text's groups: groups.txt beside gt.txt, NAME.groups.txt beside any other NAME.txt."""
-    return path.with_name("groups.txt" if path.name == LABELS else f"{path.stem}.groups.txt")
 
 
 FPS = 25.0
@@ -449,15 +445,13 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     reject(not len(table.frame), path, "no row", "people or detections", "check the file")
     length = int(table.frame.max())
 
-    def truth() -> Truth:
-        return truth_of_table(table, path.stem, rate, length, options.scale, of_boxes.person_class)
-
     require_classes(table, of_boxes.person_class)
     if (table.id == -1).all():
         more: dict[str, Any] = {"detections": partial(detections_of_table(table, of_boxes).at, fps=rate)}
     else:
         options.reject(path, "a text of people with ids", "it is for detections", "min_score")
-        more = {"load_truth": truth}
+        known = (path.stem, rate, length, options.scale, of_boxes.person_class)
+        more = {"load_truth": partial(truth_of_table, table, *known)}
     source = {"kind": "mot text", "path": str(path), "begin": begin, **of_boxes.given()}
     if table.rows.names:
         source["ids"] = dict(table.rows.names)

@@ -133,7 +133,9 @@ def _read_ndjson(path: Path, fps: float | None) -> People:
     text, kept, rows, rates = read_rows(path), list[int](), list[list[float]](), set[float]()
     for number, line in zip(text.line.tolist(), text.text, strict=True):
         match _json(path, number, line):
-            case {"track": {"f": f, "p": p, "x": x, "y": y}} if all(map(_is_place, (f, p, x, y))):
+            case {"track": {"f": f, "p": p, "x": x, "y": y}} if all(
+                is_number(v, -LARGEST, LARGEST) for v in (f, p, x, y)
+            ):
                 rows.append([f, p, x, y])
                 kept.append(number)
             case {"scene": {"fps": rate}} if is_number(rate, *FRAME_RATES):
@@ -147,10 +149,6 @@ def _read_ndjson(path: Path, fps: float | None) -> People:
                 raise _bad(path, number, line.strip()[:80], expected)
     values, stated = np.array(rows, np.float64).reshape(-1, 4), next(iter(rates), None)
     return _counted(NumericTable(path, values, np.array(kept, np.int64), "f, p, x, y"), fps or stated), stated
-
-
-def _is_place(value: object) -> bool:
-    return is_number(value, -LARGEST, LARGEST)
 
 
 def _json(path: Path, number: int, line: str) -> object:

@@ -164,8 +164,11 @@ def generated_folders(path: Path) -> list[Path]:
     """
     found = _find(path, DEPTH) if path.is_dir() else []
     other = next((p for p in found if _kind(p) != "generated"), None)
-    got, expected = "no sequences" if other is None else f"a recording, {other.name}", "a generated sequence or dataset"
-    reject(not found or other is not None, path, got, expected, "give what `flockscope generate` made")
+    got, remedy = (
+        "no sequences" if other is None else f"a recording, {other.name}",
+        "give what `flockscope generate` made",
+    )
+    reject(not found or other is not None, path, got, "a generated sequence or dataset", remedy)
     return found
 
 

@@ -21,16 +21,9 @@ from sim.store.seal import WHOLE, check_run, run_folder
 from sim.store.track_files import read_run, with_events
 from sim.truth.velocities import chords
 from sim.types import Array, Groups, Ints, Plane, Tracks
-from tracking.recordings import people_texts
+from tracking.recordings import mot_text, people_texts
 from tracking.recordings.mot_table import read_table, require_pixels, table_of_rows
-from tracking.recordings.mot_text import (
-    frames_of_times,
-    ground_positions,
-    of_class,
-    reject_duplicate_ids,
-    require_metres,
-    unit_scores,
-)  # fmt: skip
+from tracking.recordings.mot_text import of_class, unit_scores
 from tracking.recordings.options import BoxScale, Classes
 
 
@@ -88,7 +81,7 @@ def read_track_text(
     """
 
     def frames_at(seconds: Array, _: Array) -> Ints:
-        frame = frames_of_times(seconds, begin, fps)
+        frame = mot_text.frames_of_times(seconds, begin, fps)
         early = frame < 1
         if len(frame) and (early | (frame > (length or FRAMES))).mean() > 0.5:
             got, expected = f"{seconds.min():.15g} to {seconds.max():.15g} s", f"times from {begin:.15g} s on"
@@ -113,12 +106,12 @@ def read_track_text(
         table.id < 0, "ids from 0", "give each track an id", "these are detections: `flockscope track` them first"
     )
     people = of_class(table, np.ones(len(table.id), bool), person_class)
-    reject_duplicate_ids(table, people)
+    mot_text.reject_duplicate_ids(table, people)
     order = np.lexsort((table.id, table.frame))
     order = order[people[order]]
     frame, id = table.frame[order], table.id[order]
-    require_metres(table, fps)
-    ground = ground_positions(table)
+    mot_text.require_metres(table, fps)
+    ground = mot_text.ground_positions(table)
     if ground is not None:
         remedy = "complete the line, or write z = -1 in all"
         table.rows.reject(np.isnan(ground[:, 0]), "a ground position (z other than -1), as in other lines", remedy)

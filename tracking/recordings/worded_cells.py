@@ -24,11 +24,6 @@ NOTHING = ("", "none", "null", "nan", "na", "n/a", "<na>")  # cells of no value,
 SHOWN = 8  # most ids that a warning lists
 
 
-def are_numbers(cells: Sequence[str]) -> bool:
-    """Returns True if all cells of a column are numbers."""
-    return all(map(is_number_text, set(cells)))
-
-
 def usual_step(times: Array, id: Array) -> float:
     """Returns the step at which times (N,) of one id (N,) follow each other where none is missing; 0: unknown."""
     id, times = np.unique(np.column_stack([id, times]), axis=0).T
