@@ -20,12 +20,13 @@ from numpy.typing import NDArray
 from scenarios.errors import InputError, reject
 from sim import hashing, streams
 from sim.pictures import video_files
+from sim.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.pictures.picture_folder import require_size
 from sim.pictures.video_files import write_video
 from sim.store import atomic
 from sim.store.seal import REDO, check_file
 from sim.store.tables import MODAL, read_table, table_bytes, units_of
-from sim.types import Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
+from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
 
 JPG_QUALITY = 95
 TABLE = "gt/pixels.parquet"
@@ -172,6 +173,18 @@ class StoredPictures:
     def sample(self, wanted: list[int]) -> Iterable[tuple[int, Image]]:
         """Yields (frame, picture) of the left camera for the frames `wanted` (from 1, ascending)."""
         return zip(wanted, self.all("left", self.manifest["sequence"]["length"], wanted), strict=True)
+
+    def background(self, choice: BackgroundChoice | None) -> tuple[Callable[[], Image] | None, dict[str, str]]:
+        """Returns (loader of background pictures, entry for `Sequence.source`); (None, {}) if there are none."""
+        if choice is not None:
+            remedy = "leave it out: it has none"
+            reject("left" not in self.streams, self.folder, "--background", "none for one without pictures", remedy)
+            length = self.manifest["sequence"]["length"]
+            fits = choice.of(length, self.folder, self.size)
+            return BackgroundSample(fits, length, self.folder, self.sample), {"background": str(fits)}
+        if "background" not in self.streams:
+            return None, {}
+        return (lambda: np.stack(list(self.all("background", BACKGROUNDS)))), {"background": OWN_BACKGROUND}
 
     def pixel_loader(self) -> Callable[[int], PixelTruth]:
         """Returns a function that gives the PixelTruth of a frame (from 1). The stream "ids" must be stored."""

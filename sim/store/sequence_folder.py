@@ -12,12 +12,10 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from scenarios.errors import InputError, printable, reject
 from sim import hashing
 from sim.hashing import versions
-from sim.pictures.background_sample import BackgroundChoice, BackgroundSample
+from sim.pictures.background_sample import BackgroundChoice
 from sim.pictures.stored_pictures import StoredPictures, write_pictures
 from sim.store import atomic, seal, tables, truth_files
 from sim.store.camera_files import camera_document, read_camera, read_scene, scene_document
@@ -26,7 +24,7 @@ from sim.store.own_files import is_side_file
 from sim.store.recorded_sequence import recorded_sequence
 from sim.store.seal import MANIFEST, REDO, is_own_sequence, read_manifest
 from sim.streams import check_streams, coding, is_picture
-from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Image, Sequence, Truth
+from sim.types import Array, Detections, Sequence, Truth
 
 NOTHING: Mapping[str, Any] = {}
 
@@ -144,7 +142,7 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
         raise error
     about, has, pictures = manifest["sequence"], manifest["files"].keys(), StoredPictures(folder, manifest)
     size, length = about["image_size"], about["length"]
-    load_background, words = _background(pictures, background, length)
+    load_background, words = pictures.background(background)
 
     def require_length(name: str, found: int) -> None:
         reject(found != length, folder / name, f"{found} frames", f"{length} frames, as manifest.json says", REDO)
@@ -179,20 +177,6 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
         load_pixels=pictures.pixel_loader() if {"ids"} <= set(pictures.streams) else None,
         load_light=lambda: _light(folder, manifest),
     )  # fmt: skip
-
-
-def _background(
-    pictures: StoredPictures, choice: BackgroundChoice | None, length: int
-) -> tuple[Callable[[], Image] | None, dict[str, str]]:
-    """Returns (loader of background pictures, entry for `Sequence.source`); (None, {}) if there are none."""
-    if choice is not None:
-        remedy = "leave it out: it has none"
-        reject("left" not in pictures.streams, pictures.folder, "--background", "none for one without pictures", remedy)
-        fits = choice.of(length, pictures.folder, pictures.size)
-        return BackgroundSample(fits, length, pictures.folder, pictures.sample), {"background": str(fits)}
-    if "background" not in pictures.streams:
-        return None, {}
-    return (lambda: np.stack(list(pictures.all("background", BACKGROUNDS)))), {"background": OWN_BACKGROUND}
 
 
 def _light(folder: Path, manifest: dict[str, Any]) -> Array:

@@ -39,7 +39,7 @@ def people_of(path: Path, root: ET.Element) -> tuple[MotTable, int]:
     """
     rows, length = list[tuple[float, ...]](), 0
     for element in root.iterfind("frame"):
-        index = int(_number(path, "frame", element, "number", 0, FRAMES - 1, whole=True)) + 1
+        index = _whole(path, "frame", element, "number", FRAMES - 1) + 1
         length = max(length, index)
         label = _labels(path, index, element)
         rows += [_row(path, index, person, label) for person in element.iterfind("objectlist/object")]
@@ -51,11 +51,12 @@ def people_of(path: Path, root: ET.Element) -> tuple[MotTable, int]:
     return MotTable(table, frame, id, values[:, 3:], np.zeros((len(rows), 0)), group), length
 
 
-def _number(
-    path: Path, place: str, element: ET.Element, key: str, low: float = -COORDINATE, high: float = COORDINATE,
-    whole: bool = False,
-) -> float:  # fmt: skip
-    return bounded_number(path, f"{place}: {element.tag} {key}", element.get(key), low, high, whole)
+def _number(path: Path, place: str, element: ET.Element, key: str, low: float = -COORDINATE) -> float:
+    return bounded_number(path, f"{place}: {element.tag} {key}", element.get(key), low, COORDINATE)
+
+
+def _whole(path: Path, place: str, element: ET.Element, key: str, last: int = LAST_ID) -> int:
+    return int(bounded_number(path, f"{place}: {element.tag} {key}", element.get(key), 0, last, whole=True))
 
 
 def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
@@ -67,7 +68,7 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
             continue
         if members & label.keys():
             warnings.warn(f"{path}: frame {index - 1}: a person in two groups; the first holds", stacklevel=3)
-        number = int(_number(path, f"frame {index - 1}", group, "id", 0, LAST_ID, whole=True))
+        number = _whole(path, f"frame {index - 1}", group, "id")
         label.update({m: number for m in sorted(members) if m not in label})
     return label
 
@@ -75,7 +76,7 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
 def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> tuple[float, ...]:
     """Returns (frame, id, label, left, top, width, height), px; label -1 for alone."""
     place, box = f"frame {index - 1}", person.find("box")
-    id = int(_number(path, place, person, "id", 0, LAST_ID, whole=True))
+    id = _whole(path, place, person, "id")
     place += f": object {id}"
     if box is None:
         raise InputError(file=path, place=place, got="an object without box", expected="a box", remedy="add it")

@@ -87,11 +87,12 @@ def _frames_at(path: Path, sequence: Sequence, seconds: Array, _: Array) -> Ints
     fits = near & (np.abs(seconds - nearest) <= SAME)
     out = f"{(~fits).sum()} of {len(fits)} boxes have times of no frame, or of one that has nearer ones"
     if len(near) and near.mean() < 0.5:
-        raise InputError(
-            file=path, place="times", got=f"{seconds.min():g} to {seconds.max():g} s: {out}",
-            expected=f"times of {len(times)} frames, {times[0]:g} to {times[-1]:g} s",
-            remedy="give seconds since the first frame, and the recording's --fps",
-        )  # fmt: skip
+        got, remedy = (
+            f"{seconds.min():g} to {seconds.max():g} s",
+            "give seconds since the first frame, and the recording's --fps",
+        )
+        expected = f"times of {len(times)} frames, {times[0]:g} to {times[-1]:g} s"
+        raise InputError(file=path, place="times", got=f"{got}: {out}", expected=expected, remedy=remedy)
     if not fits.all():
         warnings.warn(f"{path}: {out}, and are left out", stacklevel=2)
     return np.where(fits, k + 1, 0)

@@ -58,12 +58,9 @@ def reject_missing_ids(rows: NumericTable) -> None:
     # make boxes of people one column earlier only, and the ids do not last.
     score = (values[:, 5] >= 0) & (values[:, 5] <= 1) & (values[:, 4] > 1) & (values[:, 3] > 1)
     earlier = values.shape[1] == 6 and _aspect(values[:, 1:5]) and not _aspect(values[:, 2:6]) and not _lasts(frame, id)
-    if score.all() or (len(values) >= ENOUGH and earlier):
-        raise InputError(
-            file=rows.file, place="columns", got=f"in {len(values)} lines what looks like {NO_ID} without an id",
-            expected="frame,id,left,top,width,height,…", remedy=f"write {NO_ID} as the first line, if they are these, "
-            "or -1 as the id",
-        )  # fmt: skip
+    missing, got = score.all() or (len(values) >= ENOUGH and earlier), f"in {len(values)} lines what looks like {NO_ID}"
+    remedy = f"write {NO_ID} as the first line, if they are these, or -1 as the id"
+    reject(missing, rows.file, f"{got} without an id", "frame,id,left,top,width,height,…", remedy, "columns")
 
 
 def _aspect(box: Array) -> bool:
@@ -259,13 +256,10 @@ def _reject_jitter(rows: NumericTable, frame: Column, seconds: Column, id: Colum
     row, before = order[1:], order[:-1]
     same = (frame[row] == frame[before]) & (id[row] == id[before]) & (seconds[row] != seconds[before])
     if same.any():
-        k = row[same.argmax()]
-        raise InputError(
-            file=rows.file, place=f"line {rows.line[k]}",
-            got=f"a second time of id {id[k]:.12g} in frame {frame[k]:.0f}",
-            expected="times that vary by less than half a frame",
-            remedy="number the times in order, 1, 2, 3, …, in a column frame, and give --fps",
-        )  # fmt: skip
+        k, expected = row[same.argmax()], "times that vary by less than half a frame"
+        got = f"a second time of id {id[k]:.12g} in frame {frame[k]:.0f}"
+        remedy = "number the times in order, 1, 2, 3, …, in a column frame, and give --fps"
+        raise InputError(file=rows.file, place=f"line {rows.line[k]}", got=got, expected=expected, remedy=remedy)
 
 
 def _with_somebody(text: TextRows, names: list[str]) -> TextRows:
@@ -382,10 +376,10 @@ def _metres(text: TextRows, unit: str, px_per_m: float | None) -> float:
     if unit != "px":
         return LENGTH_UNITS.get(unit, 1.0)
     if px_per_m is None:
+        got, remedy = "pixels, without a scale", "add --px-per-m, the pixels per metre"
         raise InputError(
-            file=text.file, place="columns x_px, y_px", got="pixels, without a scale", expected="metres, or a scale",
-            remedy="add --px-per-m, the pixels per metre",
-        )  # fmt: skip
+            file=text.file, place="columns x_px, y_px", got=got, expected="metres, or a scale", remedy=remedy
+        )
     return 1 / px_per_m
 
 

@@ -253,11 +253,10 @@ def _reject_categories(table: MotTable) -> None:
     few = 2 <= len(values) <= SHOWN and ENOUGH * len(values) <= len(column) and (values == np.round(values)).all()
     one = (id < 0).all() or len(np.unique(np.c_[id, column], axis=0)) == len(np.unique(id))
     if few and one and values[0] >= 0 and 2 <= values[-1] <= LAST_CLASS:
-        raise InputError(
-            file=table.rows.file, place="column 7", got=f"{', '.join(f'{v:g}' for v in values)}, as classes have",
-            expected="a confidence, or a flag 0 or 1", remedy="name the columns in the first line: "
-            "frame,id,left,top,width,height,class (…,score if it is one)",
-        )  # fmt: skip
+        got, file = f"{', '.join(f'{v:g}' for v in values)}, as classes have", table.rows.file
+        expected = "a confidence, or a flag 0 or 1"
+        remedy = "name the columns in the first line: frame,id,left,top,width,height,class (…,score if it is one)"
+        raise InputError(file=file, place="column 7", got=got, expected=expected, remedy=remedy)
 
 
 def _one_for_each(table: MotTable, column: Array) -> bool:

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from sim.store.numeric_text import CORRECT, LARGEST, NumericTable, is_number_text, read_number
 from sim.types import Array
 from tracking.recordings.options import RATES
@@ -43,14 +43,10 @@ def in_seconds(file: Path, name: str, times: Array, id: Array) -> Array:
     if not step:
         return times
     fit = [unit for unit, s in TIME_UNITS.items() if RATES[0] <= 1 / (step * s) <= RATES[1]]
-    if len(fit) != 1:
-        plain = name.removeprefix("timestep_")
-        raise InputError(
-            file=file, place=f"column {name}", got=f"times in steps of {step:.6g}, {' or '.join(fit) or 'in no unit'}",
-            expected="{:g} to {:g} times per second".format(*RATES),
-            remedy=f"name the column by its unit, {', '.join(f'{plain}_{unit}' for unit in TIME_UNITS)}; "
-            "or number frames 1, 2, 3, … in a column frame",
-        )  # fmt: skip
+    got = f"times in steps of {step:.6g}, {' or '.join(fit) or 'in no unit'}"
+    names = ", ".join(f"{name.removeprefix('timestep_')}_{unit}" for unit in TIME_UNITS)
+    remedy = f"name the column by its unit, {names}; or number frames 1, 2, 3, … in a column frame"
+    reject(len(fit) != 1, file, got, "{:g} to {:g} times per second".format(*RATES), remedy, f"column {name}")
     if fit != ["s"]:
         words = f"times in steps of {step:.6g} are taken as {fit[0]}"
         warnings.warn(f"{file}: column {name}: {words} (the name {name}_{fit[0]} says so)", stacklevel=5)
@@ -68,10 +64,8 @@ def _instant(rows: NumericTable, k: int, cell: str) -> float:
             return read_number(cell)
         found = datetime.fromisoformat(cell)
     except ValueError:
-        expected = "a number, or a time as 2024-05-01T12:00:00.5+02:00"
-        raise InputError(
-            file=rows.file, place=f"line {rows.line[k]}", got=repr(cell), expected=expected, remedy=CORRECT
-        ) from None
+        place, expected = f"line {rows.line[k]}", "a number, or a time as 2024-05-01T12:00:00.5+02:00"
+        raise InputError(file=rows.file, place=place, got=repr(cell), expected=expected, remedy=CORRECT) from None
     return (found if found.tzinfo else found.replace(tzinfo=UTC)).timestamp()
 
 
