@@ -164,9 +164,8 @@ class StoredPictures:
         name, found = streams.file_name(stream, self.images, 1), 0
         path = self.folder / name
         self.check(name)
-        for found, (_, picture) in enumerate(
-            video_files.decode_frames(path, video_files.index_packets(path), wanted), 1
-        ):
+        frames = video_files.decode_frames(path, video_files.index_packets(path), wanted)
+        for found, (_, picture) in enumerate(frames, 1):
             yield require_size(picture, self.size, path, f"frame {found}")
         reject(found != (count if wanted is None else len(wanted)), path, f"{found} pictures", count, REDO)
 

@@ -68,9 +68,8 @@ class PacketIndex:
         ranks = self.ranks()
         if ranks is None:
             return None
-        return {
-            g for g, stamp in zip(self.group, self.stamps, strict=True) if stamp is not None and ranks[stamp] in wanted
-        }
+        packets = zip(self.group, self.stamps, strict=True)
+        return {group for group, stamp in packets if stamp is not None and ranks[stamp] in wanted}
 
 
 @contextmanager

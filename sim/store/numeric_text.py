@@ -23,6 +23,7 @@ NAME_THEM = "name the columns in the first line, as frame,id,x,y or frame,id,lef
 
 LARGEST = 2**52  # whole numbers pass through float64
 CORRECT = "remove or correct it"
+OFFSET = "subtract one position near the people from all, if these are geographic, as UTM; else check the columns"
 
 
 @dataclass(frozen=True)
@@ -79,10 +80,7 @@ class NumericTable:
         crowded = np.bincount(frame, minlength=1)[frame] > DETECTIONS
         self.reject(crowded, f"at most {DETECTIONS} {self.unit}s of one frame", "check that this is the right file")
         far = ~(np.abs(self.values[:, 2:]) <= COORDINATE).all(axis=1)  # also nan
-        offset = (
-            "subtract one position near the people from all, if these are geographic, as UTM; else check the columns"
-        )
-        self.reject(far, f"numbers within {COORDINATE:g}", CORRECT, offset)
+        self.reject(far, f"numbers within {COORDINATE:g}", CORRECT, OFFSET)
 
 
 def read_text(path: Path, limit: int = TEXT_BYTES) -> str:

@@ -57,9 +57,8 @@ REDO = "run the command that made it again"
 
 # names of columns of several tables
 AXES = ("x", "y", "z")
-BOX, VISIBLE, MODAL = (
-    tuple(f"{kind}_{side}" for side in ("left", "top", "width", "height")) for kind in ("box", "visible", "modal")
-)
+SIDES = ("left", "top", "width", "height")
+BOX, VISIBLE, MODAL = (tuple(f"{kind}_{side}" for side in SIDES) for kind in ("box", "visible", "modal"))
 EXTENT = ("extent_xx", "extent_xy", "extent_yx", "extent_yy")
 # values by the name of a column: an array (R,), or lists as a pyarrow.Array; by a tuple of n names: an array (R, n); a
 # column that is None is left out

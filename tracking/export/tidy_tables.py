@@ -364,9 +364,7 @@ def _counts(rows: _Rows, number: Ints, group: Ints) -> dict[str, Any]:
     for name, corners in rows.places.items():
         ends = known.min(axis=0, initial=np.inf), known.max(axis=0, initial=-np.inf)
         if len(known) and ((corners.max(axis=0) < ends[0]) | (corners.min(axis=0) > ends[1])).any():
-            area = " and ".join(
-                f"{axis} from {low:.4g} to {high:.4g}" for axis, low, high in zip("xy", *ends, strict=True)
-            )
+            area = " and ".join(f"{k} from {low:.4g} to {high:.4g}" for k, low, high in zip("xy", *ends, strict=True))
             warnings.warn(f"{name} lies outside all positions, which have {area} {rows.unit}", stacklevel=2)
         if len(corners) == LINE:
             left, right = crossings(rows.frame, rows.id, rows.pos, corners, downwards=rows.unit == "px")

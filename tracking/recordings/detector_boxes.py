@@ -38,10 +38,10 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
     Raises InputError if the file cannot be read, has no boxes, or does not fit the sequence's frames and pictures.
     """
     if path.suffix.lower() == ".json":
-        table = table_of_rows(_coco_results(path), box_scale=options.box_scale)
+        table = table_of_rows(_coco_results(path), box_scale=options.box_scale, boxless=False)
     else:
         frames_at = partial(_frames_at, path, sequence)
-        table = read_table(path, boxless=True, box_scale=options.box_scale, frames_at=frames_at, px_per_m=1.0)
+        table = read_table(path, box_scale=options.box_scale, frames_at=frames_at, px_per_m=1.0)
     mot_text.require_classes(table, options.person_class)
     found = mot_text.detections_of_table(table, options)
     reject(not len(found.frame), path, "no box", "the boxes of a detector", "check the file")

@@ -78,9 +78,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     found, of_boxes = None, options.box_options
     if is_present(det):
-        table = read_table(
-            det, length=info.length, boxless=True, box_scale=of_boxes.box_scale, px_per_m=options.px_per_m
-        )
+        table = read_table(det, length=info.length, box_scale=of_boxes.box_scale, px_per_m=options.px_per_m)
         if not is_present(gt):  # else --class may be of the labels
             mot_text.require_classes(table, of_boxes.person_class)
         found = mot_text.detections_of_table(table, of_boxes)
@@ -118,7 +116,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         return (lambda: fill_gaps(folder.read(every, seen), length, name)) if there else None
 
     def truth() -> Truth:
-        table = read_table(gt, length=length, boxless=True, px_per_m=options.px_per_m)
+        table = read_table(gt, length=length, px_per_m=options.px_per_m)
         return mot_text.truth_of_table(table, info.name, rate, length, options.scale, of_boxes.person_class)
 
     def sample(wanted: list[int]) -> Iterator[tuple[int, Image]]:
@@ -153,4 +151,4 @@ def _find_pictures(path: Path, info: SeqInfo) -> PictureFolder:
 
 def _labelled_frames(path: Path) -> Ints:
     texts = filter(is_present, (path / "det" / "det.txt", path / "gt" / "gt.txt"))
-    return np.unique(joined((read_table(text, boxless=True, px_per_m=1.0).frame for text in texts), kind=np.int64))
+    return np.unique(joined((read_table(text, px_per_m=1.0).frame for text in texts), kind=np.int64))

@@ -144,9 +144,8 @@ NAMES = {
         name + unit for name in ("t", "time", "timestamp", "datetime", "timestep_time")
         for unit in ("", *(f"_{unit}" for unit in TIME_UNITS))
     ),
-    "id": (
-        "id", "track_id", "trackid", "track", "tracker_id", "person_id", "ped_id", "target_id", "object_id", "agent_id"
-    ),
+    "id": ("id", "track_id", "trackid", "track", "tracker_id", "person_id", "ped_id", "target_id", "object_id",
+           "agent_id"),
     "score": ("score", "conf", "confidence"),
     "class": ("class", "class_id", "cls", "category", "category_id", "object_category"),
     "left": ("left", "bb_left", "box_left_px", "xmin", "x_min", "x1"),
@@ -272,9 +271,8 @@ def _with_somebody(text: TextRows, names: list[str]) -> TextRows:
     empty = np.array([len(row) == len(names) and not any(row[k].strip('" ') for k in use) for row in cells])
     if not empty.any() or empty[1:].all():
         return text
-    warnings.warn(
-        f"{text.file}: {empty.sum()} rows have nobody in columns {', '.join(names[k] for k in use)}", stacklevel=5
-    )
+    read = ", ".join(names[k] for k in use)
+    warnings.warn(f"{text.file}: {empty.sum()} rows have nobody in columns {read}", stacklevel=5)
     return TextRows(text.file, tuple(compress(text.text, ~empty)), text.line[~empty])
 
 
@@ -376,10 +374,9 @@ def _metres(text: TextRows, unit: str, px_per_m: float | None) -> float:
     if unit != "px":
         return LENGTH_UNITS.get(unit, 1.0)
     if px_per_m is None:
-        got, remedy = "pixels, without a scale", "add --px-per-m, the pixels per metre"
-        raise InputError(
-            file=text.file, place="columns x_px, y_px", got=got, expected="metres, or a scale", remedy=remedy
-        )
+        place, got, expected = "columns x_px, y_px", "pixels, without a scale", "metres, or a scale"
+        remedy = "add --px-per-m, the pixels per metre"
+        raise InputError(file=text.file, place=place, got=got, expected=expected, remedy=remedy)
     return 1 / px_per_m
 
 
@@ -424,13 +421,13 @@ class MotTable:
 
 
 def read_table(
-    path: Path, *, length: int | None = None, boxless: bool = False, box_scale: BoxScale | None = None,
-    frames_at: FramesAt | None = None, px_per_m: float | None = None,
+    path: Path, *, length: int | None = None, box_scale: BoxScale | None = None, frames_at: FramesAt | None = None,
+    px_per_m: float | None = None,
 ) -> MotTable:  # fmt: skip
     """Returns the MotTable of a MOTChallenge text of 6 to 10 columns, or of 4: frame, id, x, y in m.
 
-    length: the last frame allowed. boxless: True allows -1,-1,-1,-1 for "no box". box_scale: factors that make the
-    boxes pixels. frames_at, px_per_m: as `read_named` takes them. Rows stay in the order of the file.
+    length: the last frame allowed. box_scale: factors that make the boxes pixels. frames_at, px_per_m: as `read_named`
+    takes them. Rows stay in the order of the file.
     """
     text = read_rows(path, heading=True)
     first = next(text.cells(), [])
@@ -443,14 +440,17 @@ def read_table(
         rows = text.numbers((GROUND_COLUMNS, *range(6, 11)), layout=LAYOUT)
         reject_missing_ids(rows)
         reject_swapped(rows)
-    return table_of_rows(rows, length, boxless, box_scale, group)
+    return table_of_rows(rows, length, box_scale, group)
 
 
 def table_of_rows(
-    rows: NumericTable, length: int | None = None, boxless: bool = False, box_scale: BoxScale | None = None,
-    group: Ints | None = None,
+    rows: NumericTable, length: int | None = None, box_scale: BoxScale | None = None, group: Ints | None = None,
+    boxless: bool = True,
 ) -> MotTable:  # fmt: skip
-    """Returns the MotTable of rows in the columns of a MOTChallenge text. Arguments as for `read_table`."""
+    """Returns the MotTable of rows in the columns of a MOTChallenge text. Arguments as for `read_table`.
+
+    boxless: True allows -1,-1,-1,-1 for "no box".
+    """
     frame, id, count = rows.integers(0, "frame", SECONDS), rows.integers(1, "id"), len(rows.line)
     box, rest = rows.values[:, 2:6], rows.values[:, 6:]
     if rows.values.shape[1] <= GROUND_COLUMNS + 1:

@@ -439,7 +439,7 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         fps, begin = fps or rate_of_times(path, seconds, id), float(seconds.min(initial=np.inf))
         return frames_of_times(seconds, begin, fps)
 
-    table = read_table(path, boxless=True, box_scale=of_boxes.box_scale, frames_at=frames_at, px_per_m=options.px_per_m)
+    table = read_table(path, box_scale=of_boxes.box_scale, frames_at=frames_at, px_per_m=options.px_per_m)
     rate = frame_rate(fps, None)
     reject(not len(table.frame), path, "no row", "people or detections", "check the file")
     length = int(table.frame.max())

@@ -18,6 +18,7 @@ import math
 import re
 import warnings
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -80,7 +81,7 @@ def open_text(layout: str, path: Path, options: RecordingOptions) -> Sequence:
 def _sequence(
     path: Path, rows: NumericTable, rate: float, length: int, options: RecordingOptions, unscored: Unscored | None
 ) -> Sequence:
-    table = table_of_rows(rows, boxless=True)
+    table = table_of_rows(rows)
     rows.reject(table.id < 0, "ids from 0", "correct the id")
     reject_swapped(rows)
 
@@ -131,11 +132,10 @@ def _read_pedpy(path: Path, fps: float | None) -> People:
 
 def _read_ndjson(path: Path, fps: float | None) -> People:
     text, kept, rows, rates = read_rows(path), list[int](), list[list[float]](), set[float]()
+    is_place = partial(is_number, low=-LARGEST, high=LARGEST)
     for number, line in zip(text.line.tolist(), text.text, strict=True):
         match _json(path, number, line):
-            case {"track": {"f": f, "p": p, "x": x, "y": y}} if all(
-                is_number(v, -LARGEST, LARGEST) for v in (f, p, x, y)
-            ):
+            case {"track": {"f": f, "p": p, "x": x, "y": y}} if all(map(is_place, (f, p, x, y))):
                 rows.append([f, p, x, y])
                 kept.append(number)
             case {"scene": {"fps": rate}} if is_number(rate, *FRAME_RATES):

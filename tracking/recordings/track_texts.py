@@ -92,19 +92,16 @@ def read_track_text(
         return np.maximum(frame, 0)
 
     if people_texts.layout_of(path) == "kitti":
-        table = table_of_rows(people_texts.kitti_tracks(path, person_class), length, box_scale=box_scale)
+        table = table_of_rows(people_texts.kitti_tracks(path, person_class), length, box_scale, boxless=False)
     else:
-        table = read_table(
-            path, length=length, boxless=True, box_scale=box_scale, frames_at=frames_at, px_per_m=px_per_m
-        )
+        table = read_table(path, length=length, box_scale=box_scale, frames_at=frames_at, px_per_m=px_per_m)
     require_pixels(table.rows, table.boxes())
     if not len(table.frame):
         if length is None:
             raise InputError(file=path, got="no row", expected="tracks", remedy="check that it was written")
         warnings.warn(f"{path}: no row, so nobody was tracked", stacklevel=3)
-    table.rows.reject(
-        table.id < 0, "ids from 0", "give each track an id", "these are detections: `flockscope track` them first"
-    )
+    most = "these are detections: `flockscope track` them first"
+    table.rows.reject(table.id < 0, "ids from 0", "give each track an id", most)
     people = of_class(table, np.ones(len(table.id), bool), person_class)
     mot_text.reject_duplicate_ids(table, people)
     order = np.lexsort((table.id, table.frame))

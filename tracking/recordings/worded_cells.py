@@ -85,6 +85,5 @@ def numbered(rows: NumericTable, cells: Sequence[str], what: str) -> tuple[Array
     number = dict(zip(words, ends if own else range(1, len(words) + 1), strict=True))
     shown = ", ".join(f"{word} as {id}" for word, id in list(number.items())[:SHOWN]) + ", …" * (len(words) > SHOWN)
     warnings.warn(f"{rows.file}: {what}s in words are numbered: {shown}", stacklevel=5)
-    return np.array([number.get(cell, -1) for cell in cells], np.float64), tuple(
-        (id, word) for word, id in number.items()
-    )
+    names = tuple((id, word) for word, id in number.items())
+    return np.array([number.get(cell, -1) for cell in cells], np.float64), names
