@@ -129,16 +129,9 @@ def _lists(rows: list[tuple[Any, ...]], ids: list[Ints], empty: NDArray[Any]) ->
     return [np.asarray(item, empty.dtype).ravel() for item in every]
 
 
-class _GroupFacts(BaseModel):
-    first: Count
-    frames: Count
-    missing: set[int]
-    memberless: set[int]
-
-
 def read_groups(table: StoredTable) -> list[Groups | None]:
     """Returns the Groups of each frame stored in a groups.parquet; None for a frame whose groups are unknown."""
-    facts = table.facts_as(_GroupFacts)
+    facts = table.facts_as(first=Count, frames=Count, missing=set[int], memberless=set[int])
     first, count = facts.first, facts.frames
     axes = AXES if "z" in table.columns else AXES[:2]
     id, size = table.ints("group"), table.floats("size")

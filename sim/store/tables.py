@@ -11,8 +11,9 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,6 +34,7 @@ Scale = Annotated[float, Field(strict=True, ge=SCALES[0], le=SCALES[1])]  # px p
 FrameNumber = Annotated[int, Field(strict=True, ge=1, le=FRAMES)]
 Count = Annotated[int, Field(strict=True, ge=0, le=FRAMES)]  # of frames
 Id = Annotated[int, Field(strict=True, ge=0, le=INTEGER)]
+PLANES = Literal["ground", "space", "image"]
 Pair = tuple[Number, Number]
 Triple = tuple[Number, Number, Number]
 
@@ -48,6 +50,13 @@ def validated(path: Path, value: Any, kind: type[M], remedy: str, place: str = "
     expected = first["msg"].removeprefix("Input should be ").removeprefix("Value error, ")
     expected = "a value" if first["type"] == "missing" else expected
     raise InputError(file=path, place=(place + steps).removeprefix("."), got=got, expected=expected, remedy=remedy)
+
+
+@cache
+def _model(**kinds: Any) -> type[BaseModel]:
+    """Returns the model of values by key. kinds: of each its type, or its type and what stands for a missing one."""
+    values: Any = {name: kind if isinstance(kind, tuple) else (kind, ...) for name, kind in kinds.items()}
+    return create_model("Values", **values)
 
 
 FORMAT = 1
@@ -113,9 +122,9 @@ class StoredTable:
         self.reject(column.dtype.kind not in kinds, name, f"a column of {column.dtype}", expected)
         return column
 
-    def facts_as(self, kind: type[M]) -> M:
-        """Returns the table's metadata as the model `kind`; raises InputError for wrong values."""
-        return validated(self.file, self.facts, kind, REDO, "schema")
+    def facts_as(self, **kinds: Any) -> Any:
+        """Returns the table's metadata as attributes; raises InputError for wrong values. kinds: as of `_model`."""
+        return validated(self.file, self.facts, _model(**kinds), REDO, "schema")
 
     def cuts(self, first: int, count: int) -> Ints:
         """Returns the index of the first row of each of `count` frames from `first` on, then R, (count + 1,)."""
@@ -252,8 +261,8 @@ def read_items(path: Path, name: str, kind: type[T], remedy: str, missing: Any =
 
     kind: of all items, as list[Event]. missing: what stands for a missing key; by default the key must be there.
     """
-    form = create_model("Items", **{name: (kind, missing)})  # type: ignore[call-overload]
-    found: T = getattr(validated(path, read_document(path), form, remedy), name)
+    values: Any = validated(path, read_document(path), _model(**{name: (kind, missing)}), remedy)
+    found: T = getattr(values, name)
     return found
 
 

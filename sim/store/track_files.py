@@ -16,7 +16,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel
 
 from scenarios.errors import InputError, reject
 from sim.arrays import joined, repeated_ids
@@ -24,7 +23,7 @@ from sim.scene.body import PERSON_HEIGHT
 from sim.store import group_files, tables
 from sim.store.atomic import lock_folder, replace_sealed
 from sim.store.seal import EXACT, NAMES, PAIRS, RUN, reject_foreign, sealed_run
-from sim.store.tables import AXES, BOX, Count, Rate, along, table_bytes, units_of
+from sim.store.tables import AXES, BOX, PLANES, Count, Rate, along, table_bytes, units_of
 from sim.store.truth_files import mot_text, score_and_place, scores_or_ones, with_ground_height
 from sim.types import Array, Camera, GroupEvent, Groups, Ints, Scene, Tracks
 
@@ -125,20 +124,13 @@ def pair_table(frame: Ints, a: Ints, b: Ints, probability: Array) -> bytes:
     return table_bytes({"frame": frame, "a": a, "b": b, "probability": probability}, {}, {})
 
 
-class _TrackFacts(BaseModel):
-    plane: Literal["ground", "space", "image"]
-    unit: Literal["person", "group"]
-    fps: Rate
-    first: Count
-    frames: Count
-    boxless: set[int]
-    derived: bool = False
-
-
 def read_track_table(folder: Path) -> list[Tracks]:
     """Returns the tracks of tracks.parquet in `folder`, one Tracks per frame, with groups but without events."""
     table = tables.read_table(folder / EXACT)
-    f = table.facts_as(_TrackFacts)
+    f = table.facts_as(
+        plane=PLANES, unit=Literal["person", "group"], fps=Rate, first=Count, frames=Count, boxless=set[int],
+        derived=(bool, False),
+    )  # fmt: skip
     state, cov = _columns(f.plane)
     d, values, frame = len(state) // 2, table.floats(*state), table.ints("frame")
     rows = RunRows(

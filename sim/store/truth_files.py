@@ -10,10 +10,9 @@ import math
 from collections.abc import Iterable, Iterator
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel
 
 from scenarios.errors import InputError
 from scenarios.reading import is_present
@@ -21,7 +20,7 @@ from sim.arrays import joined
 from sim.scene.terrain import height_at
 from sim.store import group_files, tables
 from sim.store.seal import REDO
-from sim.store.tables import AXES, BOX, VISIBLE, Count, FrameNumber, Rate, Scale, StoredTable, along, read_table
+from sim.store.tables import AXES, BOX, PLANES, VISIBLE, Count, FrameNumber, Rate, Scale, StoredTable, along, read_table
 from sim.types import Array, Bools, Detections, Groups, Ints, Order, Scene, Truth
 
 
@@ -107,19 +106,12 @@ def _cells(xyz: list[float]) -> str:
     return f"{x},{y},{z if z != '-1.000' else '-1.001'}"  # z = -1 would mean unknown
 
 
-class _TruthFacts(BaseModel):
-    name: str
-    fps: Rate
-    length: Count
-    px_per_m: Scale | None
-    labelled: list[tuple[FrameNumber, FrameNumber]] | None
-
-
 def read_truth(folder: Path) -> Truth:
     """Returns the truth in a sequence folder; fields that are not stored are None."""
     gt = folder / "gt"
     table = read_table(gt / "truth.parquet")
-    facts = table.facts_as(_TruthFacts)
+    labelled = list[tuple[FrameNumber, FrameNumber]] | None
+    facts = table.facts_as(name=str, fps=Rate, length=Count, px_per_m=Scale | None, labelled=labelled)
     length = facts.length
     frame, id = table.ints("frame"), table.ints("id")
     table.cuts(1, length)
@@ -187,17 +179,12 @@ def with_ground_height(pos: Array, scene: Scene | None) -> Array:
     return np.concatenate([pos, z[:, None]], axis=1)
 
 
-class _DetectionFacts(BaseModel):
-    plane: Literal["ground", "space", "image"]
-    frames: Count
-    fps: Rate
-
-
 def read_detections(path: Path) -> list[Detections]:
     """Returns the detections in a det.parquet, one Detections for each frame from 1."""
     table = read_table(path)
     axes = AXES if "z" in table.columns else AXES[:2]
-    pos, score, facts = table.floats(*axes), table.floats("score"), table.facts_as(_DetectionFacts)
+    pos, score = table.floats(*axes), table.floats("score")
+    facts = table.facts_as(plane=PLANES, frames=Count, fps=Rate)
     vel, box = table.known(*along(axes)), table.known(*BOX)
     found = []
     for k, (a, b) in enumerate(pairwise(table.cuts(1, facts.frames).tolist())):

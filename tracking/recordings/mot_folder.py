@@ -40,10 +40,10 @@ class SeqInfo:
 
 
 def read_seqinfo(path: Path) -> SeqInfo:
-    """Returns the values in the section [Sequence] of a seqinfo.ini; default values for missing keys."""
+    """Returns the values in the section [Sequence] of a seqinfo.ini; default values for missing keys, or no file."""
     parser = configparser.ConfigParser(interpolation=None)
     try:
-        parser.read_string(read_text(path))
+        parser.read_string(read_text(path) if is_present(path) else "")
     except configparser.Error as error:
         reason = (error.message.splitlines() or ["no ini file"])[0]
         raise InputError(file=path, got=reason, expected="key=value lines", remedy="correct the file") from None
@@ -73,7 +73,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     img1_right/ holds the pictures of the right camera of a rectified pair. The length is that of seqinfo.ini, else the
     last frame of texts and pictures. The truth is read, and checked, when asked for.
     """
-    info, images, background = _info(path), options.images, options.background
+    info, images, background = read_seqinfo(path / "seqinfo.ini"), options.images, options.background
     rate = mot_text.frame_rate(options.fps, info.fps)
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     found, of_boxes = None, options.box_options
@@ -103,8 +103,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         got, expected = "{} × {}".format(*size or ()), "{} × {}, the size of the pictures".format(*seen)
         ini, remedy = path / "seqinfo.ini", "correct it, or restore the pictures"
         raise InputError(file=ini, place="imWidth, imHeight", got=got, expected=expected, remedy=remedy)
-    doubt = "" if found is None or found.box is None or size is None else size_doubt(found.box, size)
-    if doubt:
+    if found is not None and found.box is not None and size is not None and (doubt := size_doubt(found.box, size)):
         warnings.warn(f"{det}: {doubt}", stacklevel=2)
     if not pictures.files:
         options.reject(path, "a recording without pictures", "it has none", "background")
@@ -136,12 +135,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
 def left_pictures(path: Path) -> PictureFolder:
     """Returns the PictureFolder of the left camera of the MOTChallenge folder `path`."""
-    return _find_pictures(path, _info(path))
-
-
-def _info(path: Path) -> SeqInfo:
-    ini = path / "seqinfo.ini"
-    return read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)
+    return _find_pictures(path, read_seqinfo(path / "seqinfo.ini"))
 
 
 def _find_pictures(path: Path, info: SeqInfo) -> PictureFolder:
