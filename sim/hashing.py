@@ -222,8 +222,7 @@ def runtime() -> dict[str, str]:
 
     These are the versions of Python, flockscope and all libraries, and under "sources" the `source_hash`.
     """
-    root = Path(__file__).resolve().parents[1]
-    return {**versions(drawn=True), "sources": source_hash(root)}
+    return {**versions(drawn=True), "sources": source_hash(Path(__file__).resolve().parents[1])}
 
 
 def source_hash(root: Path) -> str:

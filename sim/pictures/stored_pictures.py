@@ -53,12 +53,10 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
     assert sequence.image_size is not None, "pictures have a size"
     known, hashes = list[PixelTruth](), {name: hashing.PixelHash() for name in wanted}
     with ExitStack() as stack:
-        movies = {
-            name: stack.enter_context(
-                write_video(folder / streams.file_name(name, images, 1), sequence.image_size, sequence.fps)
-            )
-            for name in wanted if streams.suffix(name, images) == "mp4"
-        }  # fmt: skip
+        movies = {}
+        for name in (name for name in wanted if streams.suffix(name, images) == "mp4"):
+            video = write_video(folder / streams.file_name(name, images, 1), sequence.image_size, sequence.fps)
+            movies[name] = stack.enter_context(video)
 
         def add(name: str, picture: NDArray[Any] | None) -> None:
             if picture is None:

@@ -58,9 +58,7 @@ def write_sequence(
         assert truth is None or truth.length == sequence.length
         pixels = write_pictures(partial, sequence, wanted, images)
         pictures = {path.relative_to(partial).as_posix(): path for path in partial.rglob("*") if path.is_file()}
-        files = sequence_files(
-            sequence, scenario=scenario, seed=seed, repeat=repeat, images=images, pixels=pixels, pictures=pictures
-        )
+        files = sequence_files(sequence, scenario, seed, repeat, images, pixels, pictures)
         for name, body in files.items():
             atomic.write_inside(partial / name, body)
         names |= {*files, *pictures}
@@ -81,7 +79,7 @@ def _refuse_foreign(folder: Path, names: set[str]) -> bool:
 
 
 def sequence_files(
-    sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, images: str = "jpg",
+    sequence: Sequence, scenario: str, seed: int, repeat: int = 0, images: str = "jpg",
     pixels: Mapping[str, str] = NOTHING, pictures: Mapping[str, Path] = NOTHING,
 ) -> dict[str, bytes]:  # fmt: skip
     """Returns the files of a sequence except its pictures: content by name, the manifest last.

@@ -114,7 +114,8 @@ def _annotations(
     ids = None if sequence.load_pixels is None else np.asfortranarray(sequence.load_pixels(index).ids)
     for row in range(*truth.rows(index).indices(len(boxes))):
         box = [round(v, 2) for v in boxes[row].tolist()]
-        left, top, right, bottom = _inside(boxes[row], size)
+        corners = np.clip([boxes[row, :2], boxes[row, :2] + boxes[row, 2:]], 0, size)
+        left, top, right, bottom = np.round(corners.ravel(), 2).tolist()
         if not (right > left and bottom > top):  # also for nan
             continue
         person, area = int(truth.id[row]), round(box[2] * box[3], 2)
@@ -126,11 +127,6 @@ def _annotations(
             "bbox": box, "segmentation": segmentation, "area": area, "iscrowd": 0, "track_id": person,
             "group_id": int(truth.group[row]), "visibility": round(float(truth.visibility[row]), 3),
         }  # fmt: skip
-
-
-def _inside(box: Array, size: tuple[int, ...]) -> tuple[float, ...]:
-    low, high = np.clip(box[:2], 0, size), np.clip(box[:2] + box[2:], 0, size)
-    return tuple(np.round([*low, *high], 2).tolist())
 
 
 def run_lengths(mask: Bools) -> list[int]:

@@ -29,7 +29,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from scenarios.errors import InputError, reject
+from scenarios.errors import reject
 from scenarios.limits import COORDINATE
 from sim.arrays import joined, no_ids
 from sim.geometry.polygons import cross
@@ -394,16 +394,13 @@ def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
         name, _, cells = text.partition("=")
         values = list(map(number_or_nan, cells.split(",")))
         count = len(values) == 4 if option == "--line" else len(values) >= 6 and len(values) % 2 == 0
-        got, expected = repr(text), f"{forms[option]}, each name once, of letters, digits and _"
+        form = f"{forms[option]}, each name once, of letters, digits and _"
         remedy = "write --line door=2,5,4,5 or --zone hall=0,0,9,0,9,6; in px for tracks in the image"
-        if name.isidentifier() and name not in found and count and np.max(np.abs(values)) <= COORDINATE:
-            found[name] = np.reshape(values, (-1, 2))
-            fault = _fault(found[name])
-            if not fault:
-                continue
-            got = f"{text!r}, {fault}"
-            expected = "two ends apart" if option == "--line" else "corners in order round it"
-        raise InputError(place=option, got=got, expected=expected, remedy=remedy)
+        right = name.isidentifier() and name not in found and count and np.max(np.abs(values)) <= COORDINATE
+        reject(not right, "", repr(text), form, remedy, option)
+        found[name] = np.reshape(values, (-1, 2))
+        fault, expected = _fault(found[name]), "two ends apart" if option == "--line" else "corners in order round it"
+        reject(fault, "", f"{text!r}, {fault}", expected, remedy, option)
     return found
 
 

@@ -58,10 +58,9 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
     reject(sequence.length is not None and last > sequence.length, path, f"frame {last}", expected, remedy)
     if sequence.image_size is not None:
         far = np.quantile(found.box[:, :2] + found.box[:, 2:], 0.95, axis=0)
-        if (far > OUTSIDE * np.array(sequence.image_size)).any():
-            got, remedy = "boxes that end at {:.0f}, {:.0f} px".format(*far), "if they are of another size, --box-scale"
-            expected = "boxes in pictures of {} × {} px".format(*sequence.image_size)
-            raise InputError(file=path, got=got, expected=expected, remedy=remedy)
+        got, remedy = "boxes that end at {:.0f}, {:.0f} px".format(*far), "if they are of another size, --box-scale"
+        expected = "boxes in pictures of {} × {} px".format(*sequence.image_size)
+        reject((far > OUTSIDE * np.array(sequence.image_size)).any(), path, got, expected, remedy)
 
     def joined(frames: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
         for frame in frames():
@@ -87,12 +86,10 @@ def _frames_at(path: Path, sequence: Sequence, seconds: Array, _: Array) -> Ints
     fits = near & (np.abs(seconds - nearest) <= SAME)
     out = f"{(~fits).sum()} of {len(fits)} boxes have times of no frame, or of one that has nearer ones"
     if len(near) and near.mean() < 0.5:
-        got, remedy = (
-            f"{seconds.min():g} to {seconds.max():g} s",
-            "give seconds since the first frame, and the recording's --fps",
-        )
+        got = f"{seconds.min():g} to {seconds.max():g} s: {out}"
         expected = f"times of {len(times)} frames, {times[0]:g} to {times[-1]:g} s"
-        raise InputError(file=path, place="times", got=f"{got}: {out}", expected=expected, remedy=remedy)
+        remedy = "give seconds since the first frame, and the recording's --fps"
+        raise InputError(file=path, place="times", got=got, expected=expected, remedy=remedy)
     if not fits.all():
         warnings.warn(f"{path}: {out}, and are left out", stacklevel=2)
     return np.where(fits, k + 1, 0)

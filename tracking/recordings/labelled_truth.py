@@ -29,24 +29,27 @@ RUN = 3.0
 
 def warn_of_places(file: Path, truth: Truth) -> None:
     """Warns if a file's positions and velocities can hardly be on the ground in m and m/s."""
-    if truth.pos is None or truth.vel is None:
-        return
-    known = np.isfinite(truth.pos + truth.vel).all(axis=1)
-    near = _distance_of_neighbours(truth.frame[known], truth.pos[known])
+    if (
+        truth.pos is not None
+        and truth.vel is not None
+        and (doubt := _doubt(truth.frame, truth.id, truth.pos, truth.vel))
+    ):
+        warnings.warn(f"{file}: positions of people: {doubt}", stacklevel=4)
+
+
+def _doubt(frame: Ints, id: Ints, pos: Array, vel: Array) -> str:
+    known = np.isfinite(pos + vel).all(axis=1)
+    near = _distance_of_neighbours(frame[known], pos[known])
     if near < NEAR:
-        doubt = f"half are within {near:.2g} m of another: write metres, or name the unit, as x_km,y_km"
-        warnings.warn(f"{file}: positions of people: {doubt}", stacklevel=4)
-        return
-    if len(np.unique(truth.id[known])) < SOME:
-        return
-    span, speed = np.ptp(truth.pos[known], axis=0), np.median(np.hypot(*truth.vel[known].T))
-    doubt = f"their median speed is {speed:.3g} m/s: check their unit, and the frame rate" if speed > RUN else ""
+        return f"half are within {near:.2g} m of another: write metres, or name the unit, as x_km,y_km"
+    if len(np.unique(id[known])) < SOME:
+        return ""
+    span, speed = np.ptp(pos[known], axis=0), np.median(np.hypot(*vel[known].T))
     if span.max() <= 1:
-        doubt = "all are within 1 m: write metres, if they are shares of a picture or degrees"
-    elif span.min() == 0:
-        doubt = f"all have the same {'xy'[span.argmin()]}: give x and y on the ground, if it is the height"
-    if doubt:
-        warnings.warn(f"{file}: positions of people: {doubt}", stacklevel=4)
+        return "all are within 1 m: write metres, if they are shares of a picture or degrees"
+    if span.min() == 0:
+        return f"all have the same {'xy'[span.argmin()]}: give x and y on the ground, if it is the height"
+    return f"their median speed is {speed:.3g} m/s: check their unit, and the frame rate" if speed > RUN else ""
 
 
 def _distance_of_neighbours(frame: Ints, pos: Array) -> float:

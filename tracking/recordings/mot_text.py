@@ -339,8 +339,7 @@ def detections_of_table(table: MotTable, options: BoxOptions) -> DetectionTable:
         got, expected = options.min_score, f"at most {raw.max():g}, the greatest score"
         raise InputError(file=path, place="--min-score", got=got, expected=expected, remedy="lower it")
     rows, score = rows[good], score[good]
-    box = None if boxless.any() else table.box[rows]
-    return DetectionTable(table.frame[rows], plane, pos[rows], box, score)
+    return DetectionTable(table.frame[rows], plane, pos[rows], None if boxless.any() else table.box[rows], score)
 
 
 def _places(table: MotTable) -> tuple[Array | None, Bools]:
@@ -380,18 +379,16 @@ def truth_of_table(
         v = table.rest[:, 2]
         table.rows.reject((v > 1) | ((v < 0) & (v != -1)), "visibility from 0 to 1, or -1", "correct the last column")
         visibility = np.where(v[order] < 0, 1.0, v[order])
-    place = None if ground is None else ground[order]
+    pos = None if ground is None else ground[order, :2]
+    vel = None if pos is None else differentiate(frame, id, pos, fps)
     if not np.isfinite(px_per_m) and boxed:
         px_per_m = scale_of_all_boxes(box[:, 3])
     frames = length if length is not None else int(frame.max(initial=0))
     truth = Truth(
         name=name, fps=fps, length=frames, px_per_m=px_per_m, frame=frame, id=id,
-        group=np.full(len(order), -1, np.int64),
-        pos=None if place is None else place[:, :2],
-        vel=None if place is None else differentiate(frame, id, place[:, :2], fps),
-        box=box if boxed else None, visibility=visibility,
-        z=None if place is None else place[:, 2],
-        labelled=np.zeros(frames, bool), unscored=unscored_rows(table, keep, name, person_class) if boxed else None,
+        group=np.full(len(order), -1, np.int64), pos=pos, vel=vel, box=box if boxed else None, visibility=visibility,
+        z=None if ground is None else ground[order, 2], labelled=np.zeros(frames, bool),
+        unscored=unscored_rows(table, keep, name, person_class) if boxed else None,
     )  # fmt: skip
     warn_of_places(table.rows.file, truth)
     if table.group is not None:
