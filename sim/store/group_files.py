@@ -54,7 +54,7 @@ class _Event(BaseModel):
 
 def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
     """Returns the events of an events.json as pairs: the event, and the frame whose tracks reported it or None."""
-    found = tables.read_items(path, "events", list[_Event], "correct the event")
+    found = tables.read_values(path, "correct the event", events=list[_Event]).events
     places = [(tables.none_to_nan(e.pos[0]), tables.none_to_nan(e.pos[1])) for e in found]
     fields = [e.model_dump(exclude={"frame", "pos"}) for e in found]
     return [(GroupEvent(**f, pos=pos), e.frame) for f, pos, e in zip(fields, places, found, strict=True)]
@@ -85,14 +85,15 @@ class _Order(BaseModel):
 
 def read_script(path: Path) -> tuple[Order, ...]:
     """Returns the orders in a script.json; () if it has no list of orders."""
-    found = tables.read_items(path, "orders", tuple[_Order, ...], "restore it", ())
-    return tuple(Order(**order.model_dump()) for order in found)
+    found = tables.read_values(path, "restore it", orders=(tuple[_Order, ...], ()))
+    return tuple(Order(**order.model_dump()) for order in found.orders)
 
 
 def read_never_arrives(folder: Path) -> tuple[NeverArrives, ...]:
     """Returns the groups of a sequence folder that do not reach their goal; () if it has no such file."""
     path = folder / NEVER_ARRIVES
-    return tables.read_items(path, "groups", tuple[NeverArrives, ...], "restore it") if is_present(path) else ()
+    kind = tuple[NeverArrives, ...]
+    return tables.read_values(path, "restore it", groups=kind).groups if is_present(path) else ()
 
 
 CSV_COLUMNS = ("frame", "group", "members", "x", "y", "hull", "size")
@@ -139,13 +140,12 @@ def read_groups(table: StoredTable) -> list[Groups | None]:
     extent = table.floats(*EXTENT).reshape(-1, 2, 2)
     members, flat = table.lists("members", np.int64), table.lists("hull", np.float64)
     table.reject(any(len(h) % 2 for h in flat), "hull", "half a vertex", "x and y of each vertex")
-    hulls, cuts = [h.reshape(-1, 2) for h in flat], table.cuts(first, count)
+    hulls = [h.reshape(-1, 2) for h in flat]
     found: list[Groups | None] = []
-    for k in range(count):
-        r = slice(int(cuts[k]), int(cuts[k + 1]))
-        who = () if first + k in facts.memberless else tuple(members[r])
+    for k, r in enumerate(table.cuts(first, count), first):
+        who = () if k in facts.memberless else tuple(members[r])
         some = Groups(id[r], who, pos[r], vel[r], extent[r], size[r], tuple(hulls[r]))
-        found.append(None if first + k in facts.missing else some)
+        found.append(None if k in facts.missing else some)
     return found
 
 

@@ -12,6 +12,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -25,7 +26,6 @@ from scenarios.reading import parse_json, require_regular
 from sim.types import Array, Ints
 
 M = TypeVar("M", bound=BaseModel)
-T = TypeVar("T")
 
 # Numbers of JSON files. pydantic takes lists for tuples; numbers are strict, so that no text or bool is one.
 Number = Annotated[float, Field(strict=True, ge=-COORDINATE, le=COORDINATE)]
@@ -126,12 +126,12 @@ class StoredTable:
         """Returns the table's metadata as attributes; raises InputError for wrong values. kinds: as of `_model`."""
         return validated(self.file, self.facts, _model(**kinds), REDO, "schema")
 
-    def cuts(self, first: int, count: int) -> Ints:
-        """Returns the index of the first row of each of `count` frames from `first` on, then R, (count + 1,)."""
+    def cuts(self, first: int, count: int) -> list[slice]:
+        """Returns the rows of each of `count` frames from `first` on."""
         frame = self.ints("frame")
         wrong = bool(len(frame)) and (frame.min() < first or frame.max() >= first + count or (np.diff(frame) < 0).any())
         self.reject(bool(wrong), "frame", "other frames", f"frames {first} to {first + count - 1}, in order")
-        return np.searchsorted(frame, np.arange(first, first + count + 1))
+        return [slice(*cut) for cut in pairwise(np.searchsorted(frame, np.arange(first, first + count + 1)).tolist())]
 
     def reject(self, wrong: bool, place: str, got: str, expected: str) -> None:
         """Raises InputError about a place in this file if `wrong` is True."""
@@ -256,14 +256,12 @@ def read_document(path: Path, remedy: str = REDO) -> dict[str, Any]:
     return value
 
 
-def read_items(path: Path, name: str, kind: type[T], remedy: str, missing: Any = ...) -> T:
-    """Returns the items under the key `name` of a JSON file, as `json_list` writes it; InputError for wrong values.
+def read_values(path: Path, remedy: str, no_json: str = REDO, /, **kinds: Any) -> Any:
+    """Returns the values of a JSON file of ours as attributes; raises InputError for wrong ones. kinds: as of `_model`.
 
-    kind: of all items, as list[Event]. missing: what stands for a missing key; by default the key must be there.
+    remedy: for a wrong value. no_json: for a file that is no JSON object.
     """
-    values: Any = validated(path, read_document(path), _model(**{name: (kind, missing)}), remedy)
-    found: T = getattr(values, name)
-    return found
+    return validated(path, read_document(path, no_json), _model(**kinds), remedy)
 
 
 def none_to_nan(value: float | None) -> float:

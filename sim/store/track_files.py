@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
@@ -140,8 +139,8 @@ def read_track_table(folder: Path) -> list[Tracks]:
     )  # fmt: skip
     rows.reject_faults(table.file, tables.REDO)
     groups, found = _groups(folder / "groups.parquet", f.first, f.frames), []
-    for index, (a, b) in enumerate(pairwise(table.cuts(f.first, f.frames).tolist()), f.first):
-        r, box = slice(a, b), None if index in f.boxless else rows.box[a:b]
+    for index, r in enumerate(table.cuts(f.first, f.frames), f.first):
+        box = None if index in f.boxless else rows.box[r]
         made = Tracks(
             index, (index - 1) / f.fps, f.plane, f.unit, rows.id[r], rows.group[r], rows.pos[r], rows.vel[r],
             rows.cov[r], box, rows.score[r], groups[index - f.first], derived=f.derived, seen=rows.seen[r],

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -187,8 +186,8 @@ def read_detections(path: Path) -> list[Detections]:
     facts = table.facts_as(plane=PLANES, frames=Count, fps=Rate)
     vel, box = table.known(*along(axes)), table.known(*BOX)
     found = []
-    for k, (a, b) in enumerate(pairwise(table.cuts(1, facts.frames).tolist())):
-        cut = (pos[a:b], None if vel is None else vel[a:b], None if box is None else box[a:b], score[a:b])
+    for k, r in enumerate(table.cuts(1, facts.frames)):
+        cut = (pos[r], None if vel is None else vel[r], None if box is None else box[r], score[r])
         found.append(Detections(k + 1, k / facts.fps, facts.plane, *cut))
     return found
 
