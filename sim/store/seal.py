@@ -61,13 +61,6 @@ class _Facts(BaseModel):
     bytes: Id
 
 
-class _Sealed(BaseModel):
-    """The keys of each seal that are checked."""
-
-    files: dict[Annotated[str, AfterValidator(_inside)], _Facts]
-    truth_hash: str | None = None
-
-
 class _SequenceFacts(BaseModel):
     name: str
     fps: Rate
@@ -76,37 +69,22 @@ class _SequenceFacts(BaseModel):
     px_per_m: Scale | None
 
 
-class _Manifest(_Sealed):
-    """The keys of manifest.json that readers use."""
-
-    format: Any
-    sequence: _SequenceFacts
-    seed: Id
-    repeat: Id
-    truth_hash: str
-    content_hash: str
-    scenario_hash: str
-    streams: tuple[Literal[STREAMS], ...] = ()  # type: ignore[valid-type]
-    images: Literal[IMAGES] | None = None  # type: ignore[valid-type]
-    stride: FrameNumber = 1
-
-
-class _Run(_Sealed):
-    """The keys of run.json that commands read."""
-
-    boxes: Literal["measured", "projected", "none"]
-    tracker: str = ""
-    sequence: str = ""
-    config: dict[str, Any] | None = None
-    grouping: dict[str, Any] | None = None
-    sensor: dict[str, Any] | None = None
-    seed: Annotated[int, Field(strict=True, ge=-INTEGER, le=INTEGER)] | None = None
-    detections: str | None = None
-    background: str | None = None
-    plane: str | None = None
-    causal: StrictBool | None = None
-    fps: Rate | None = None
-    px_per_m: Annotated[float, Field(strict=True)] | None = None
+FILES = dict[Annotated[str, AfterValidator(_inside)], _Facts]
+TABLE = (dict[str, Any] | None, None)
+TEXT = (str | None, None)
+# the keys of manifest.json that readers use, and those of run.json that commands read
+MANIFEST_KEYS = tables.model(
+    files=FILES, truth_hash=str, format=Any, sequence=_SequenceFacts, seed=Id, repeat=Id, content_hash=str,
+    scenario_hash=str, streams=(tuple[Literal[STREAMS], ...], ()),  # type: ignore[valid-type]
+    images=(Literal[IMAGES] | None, None), stride=(FrameNumber, 1),
+)  # fmt: skip
+RUN_KEYS = tables.model(
+    files=FILES, truth_hash=TEXT, boxes=Literal["measured", "projected", "none"], tracker=(str, ""), sequence=(str, ""),
+    config=TABLE, grouping=TABLE, sensor=TABLE,
+    seed=(Annotated[int, Field(strict=True, ge=-INTEGER, le=INTEGER)] | None, None),
+    detections=TEXT, background=TEXT, plane=TEXT, causal=(StrictBool | None, None), fps=(Rate | None, None),
+    px_per_m=(Annotated[float, Field(strict=True)] | None, None),
+)  # fmt: skip
 
 
 def file_facts(files: Mapping[str, bytes | Path]) -> dict[str, dict[str, Any]]:
@@ -121,8 +99,8 @@ def with_hash(document: dict[str, Any]) -> dict[str, Any]:
     return {**body, "sha256": hashing.canonical_hash(body)}
 
 
-def _read(path: Path, kind: type[_Sealed], remedy: str) -> dict[str, Any]:
-    document = tables.read_document(path, OLD if kind is _Run else remedy)
+def _read(path: Path, kind: type[BaseModel], remedy: str) -> dict[str, Any]:
+    document = tables.read_document(path, OLD if kind is RUN_KEYS else remedy)
     if document.get("sha256") != with_hash(document)["sha256"]:
         raise InputError(file=path, got="altered fields", expected="those that its sha256 names", remedy=remedy)
     validated(path, document, kind, remedy)
@@ -200,7 +178,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     """Returns the manifest.json of a sequence folder; checks its own hash and its values, but no other file."""
     path = folder / MANIFEST
     reject(not path.is_file(), path, "missing", "the manifest of a complete sequence", REDO)
-    manifest = _read(path, _Manifest, REDO)
+    manifest = _read(path, MANIFEST_KEYS, REDO)
     unsized = manifest.get("streams") and manifest["sequence"]["image_size"] is None
     reject(unsized, path, "null", "the size of the pictures", REDO, "sequence.image_size")
     return manifest
@@ -270,7 +248,7 @@ def sealed_run(info: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
     """Returns the content of run.json: `info`, size and hash of each of `files` (content by name), its own hash."""
     stated = {"format": tables.FORMAT, **info, "files": file_facts(files)}
     read = json.loads(tables.json_text(stated))  # hashed as it will be read
-    validated(Path(RUN), read, _Run, "correct info")
+    validated(Path(RUN), read, RUN_KEYS, "correct info")
     return tables.json_document(with_hash(read))
 
 
@@ -278,7 +256,7 @@ def read_run(folder: Path) -> dict[str, Any]:
     """Returns the run.json of a folder, with its own hash checked; no other file is read."""
     got, expected = f"tracks without {RUN}", "a run that was finished"
     reject(not (folder / RUN).is_file(), folder, got, expected, f"incomplete: {AGAIN}")
-    return _read(folder / RUN, _Run, AGAIN)
+    return _read(folder / RUN, RUN_KEYS, AGAIN)
 
 
 def run_problems(folder: Path, run: dict[str, Any]) -> Iterator[InputError]:

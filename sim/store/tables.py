@@ -53,7 +53,7 @@ def validated(path: Path, value: Any, kind: type[M], remedy: str, place: str = "
 
 
 @cache
-def _model(**kinds: Any) -> type[BaseModel]:
+def model(**kinds: Any) -> type[BaseModel]:
     """Returns the model of values by key. kinds: of each its type, or its type and what stands for a missing one."""
     values: Any = {name: kind if isinstance(kind, tuple) else (kind, ...) for name, kind in kinds.items()}
     return create_model("Values", **values)
@@ -123,8 +123,8 @@ class StoredTable:
         return column
 
     def facts_as(self, **kinds: Any) -> Any:
-        """Returns the table's metadata as attributes; raises InputError for wrong values. kinds: as of `_model`."""
-        return validated(self.file, self.facts, _model(**kinds), REDO, "schema")
+        """Returns the table's metadata as attributes; raises InputError for wrong values. kinds: as of `model`."""
+        return validated(self.file, self.facts, model(**kinds), REDO, "schema")
 
     def cuts(self, first: int, count: int) -> list[slice]:
         """Returns the rows of each of `count` frames from `first` on."""
@@ -257,11 +257,11 @@ def read_document(path: Path, remedy: str = REDO) -> dict[str, Any]:
 
 
 def read_values(path: Path, remedy: str, no_json: str = REDO, /, **kinds: Any) -> Any:
-    """Returns the values of a JSON file of ours as attributes; raises InputError for wrong ones. kinds: as of `_model`.
+    """Returns the values of a JSON file of ours as attributes; raises InputError for wrong ones. kinds: as of `model`.
 
     remedy: for a wrong value. no_json: for a file that is no JSON object.
     """
-    return validated(path, read_document(path, no_json), _model(**kinds), remedy)
+    return validated(path, read_document(path, no_json), model(**kinds), remedy)
 
 
 def none_to_nan(value: float | None) -> float:

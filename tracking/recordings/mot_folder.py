@@ -85,7 +85,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     else:
         names = "box_scale min_score" if is_present(gt) else "box_scale min_score person_class"
         options.reject(path, "a recording without det/det.txt", "it has no detections", names)
-    pictures = _find_pictures(path, info)
+    pictures = left_pictures(path)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
     length = info.length or max(_labelled_frames(path).max(initial=0).item(), pictures.last)
     expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
@@ -135,10 +135,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
 def left_pictures(path: Path) -> PictureFolder:
     """Returns the PictureFolder of the left camera of the MOTChallenge folder `path`."""
-    return _find_pictures(path, read_seqinfo(path / "seqinfo.ini"))
-
-
-def _find_pictures(path: Path, info: SeqInfo) -> PictureFolder:
+    info = read_seqinfo(path / "seqinfo.ini")
     texts = is_present(path / "gt" / "gt.txt") or is_present(path / "det" / "det.txt")
     return find_pictures(path / info.image_dir, info.length, (lambda: _labelled_frames(path)) if texts else None)
 
