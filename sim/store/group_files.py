@@ -200,10 +200,6 @@ def _ids(text: str | None) -> list[Any]:
     return [whole_or_number(word) for word in (text or "").split()]
 
 
-def _hull(text: str | None) -> Any:
-    return parse_wkt(text) if text else ()
-
-
 class _GroupRow(BaseModel):
     """A row of groups.csv."""
 
@@ -212,7 +208,7 @@ class _GroupRow(BaseModel):
     members: Annotated[list[Id], BeforeValidator(_ids)]
     x: Annotated[Number | None, BeforeValidator(_value)] = None
     y: Annotated[Number | None, BeforeValidator(_value)] = None
-    hull: Annotated[tuple[Pair, ...], BeforeValidator(_hull)] = ()
+    hull: Annotated[tuple[Pair, ...], BeforeValidator(lambda text: parse_wkt(text) if text else ())] = ()
     size: Annotated[Annotated[Number, Field(ge=0)] | None, BeforeValidator(_value)] = None
 
 

@@ -6,7 +6,6 @@ is written only for a truth with boxes.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -95,14 +94,9 @@ def mot_text(frame: Ints, id: Ints, box: Array, rest: Iterable[str]) -> bytes:
 def score_and_place(score: Array, place: Array | None) -> Iterator[str]:
     """Yields the cells conf, x, y, z of R MOT lines. place (R, 3): positions in m, nan or None if unknown."""
     places = np.full((len(score), 3), np.nan) if place is None else place
-    return (f"{s:.4f},{_cells(xyz.tolist())}" for s, xyz in zip(score, places, strict=True))
-
-
-def _cells(xyz: list[float]) -> str:
-    if not all(map(math.isfinite, xyz)):
-        return "-1,-1,-1"
-    x, y, z = (f"{v:.3f}" for v in xyz)
-    return f"{x},{y},{z if z != '-1.000' else '-1.001'}"  # z = -1 would mean unknown
+    for s, known, xyz in zip(score, np.isfinite(places).all(axis=1), places, strict=True):
+        x, y, z = (f"{v:.3f}" for v in xyz.tolist()) if known else ("-1", "-1", "-1")
+        yield f"{s:.4f},{x},{y},{z if z != '-1.000' else '-1.001'}"  # z = -1 would mean unknown
 
 
 def read_truth(folder: Path) -> Truth:

@@ -28,7 +28,7 @@ from sim.types import LENGTH_UNITS, Array, Bools, Ints
 from tracking.recordings.options import BoxScale
 from tracking.recordings.worded_cells import TIME_UNITS, in_seconds, instants, numbered
 
-ENOUGH = 10  # rows that are needed to judge by how their columns vary
+ENOUGH = 10  # rows or steps that are needed to judge by how they vary, or by how many of them something is true
 
 LOWEST = 3.0  # px: most boxes of people are higher, unless they are shares of the picture or metres
 

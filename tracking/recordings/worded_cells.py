@@ -21,7 +21,7 @@ from tracking.recordings.options import RATES
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # s
 UNITS = "s, ms, us or ns"
 NOTHING = ("", "none", "null", "nan", "na", "n/a", "<na>")  # cells of no value, in lower case
-SHOWN = 8  # most ids that a warning lists
+SHOWN = 8  # most ids or values that a message lists
 
 
 def usual_step(times: Array, id: Array) -> float:
