@@ -284,9 +284,9 @@ def find_pictures(folder: Path, length: int | None, labelled: Labelled | None) -
 def find_right_pictures(folder: Path, left: PictureFolder) -> PictureFolder:
     """Returns the picture files of the right camera by frame, numbered like those of the left one."""
     files = _picture_files(folder)
-    if files and left.numbering is None and len(files) != len(left.files):
-        got, expected = f"{len(files)} pictures without numbers", f"{len(left.files)}, as in {left.folder.name}"
-        raise _wrong(folder, got, expected, "number the pictures of both cameras")
+    unlike = files and left.numbering is None and len(files) != len(left.files)
+    got, expected = f"{len(files)} pictures without numbers", f"{len(left.files)}, as in {left.folder.name}"
+    reject(unlike, folder, got, expected, "number the pictures of both cameras")
     return PictureFolder(folder, frames_of(folder, files, left.numbering), left.numbering)
 
 

@@ -29,10 +29,9 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
         seen = has_box(truth.box)
         visibility = [f"1,1,{v:.3f}" for v in truth.visibility[seen].tolist()]
         files["gt/gt.txt"] = mot_text(truth.frame[seen], truth.id[seen], truth.box[seen], visibility)
-    if truth.groups is not None:
-        files["gt/groups.parquet"] = group_files.groups_bytes(truth.groups, 1, "m")
-    if truth.groups_px is not None:
-        files["gt/groups_px.parquet"] = group_files.groups_bytes(truth.groups_px, 1, "px")
+    for name, groups, unit in (("groups", truth.groups, "m"), ("groups_px", truth.groups_px, "px")):
+        if groups is not None:
+            files[f"gt/{name}.parquet"] = group_files.groups_bytes(groups, 1, unit)
     if truth.groups is not None or truth.groups_px is not None:
         files["gt/groups.csv"] = group_files.groups_csv(truth.groups, truth.groups_px)
     if truth.events is not None:
@@ -94,8 +93,8 @@ def mot_text(frame: Ints, id: Ints, box: Array, rest: Iterable[str]) -> bytes:
 def score_and_place(score: Array, place: Array | None) -> Iterator[str]:
     """Yields the cells conf, x, y, z of R MOT lines. place (R, 3): positions in m, nan or None if unknown."""
     places = np.full((len(score), 3), np.nan) if place is None else place
-    for s, known, xyz in zip(score, np.isfinite(places).all(axis=1), places, strict=True):
-        x, y, z = (f"{v:.3f}" for v in xyz.tolist()) if known else ("-1", "-1", "-1")
+    for s, xyz in zip(score, places, strict=True):
+        x, y, z = (f"{v:.3f}" for v in xyz.tolist()) if np.isfinite(xyz).all() else ("-1", "-1", "-1")
         yield f"{s:.4f},{x},{y},{z if z != '-1.000' else '-1.001'}"  # z = -1 would mean unknown
 
 
