@@ -6,6 +6,7 @@ is written only for a truth with boxes.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
@@ -93,8 +94,8 @@ def mot_text(frame: Ints, id: Ints, box: Array, rest: Iterable[str]) -> bytes:
 def score_and_place(score: Array, place: Array | None) -> Iterator[str]:
     """Yields the cells conf, x, y, z of R MOT lines. place (R, 3): positions in m, nan or None if unknown."""
     places = np.full((len(score), 3), np.nan) if place is None else place
-    for s, xyz in zip(score, places, strict=True):
-        x, y, z = (f"{v:.3f}" for v in xyz.tolist()) if np.isfinite(xyz).all() else ("-1", "-1", "-1")
+    for s, xyz in zip(score, map(np.ndarray.tolist, places), strict=True):
+        x, y, z = (f"{v:.3f}" for v in xyz) if all(map(math.isfinite, xyz)) else ("-1", "-1", "-1")
         yield f"{s:.4f},{x},{y},{z if z != '-1.000' else '-1.001'}"  # z = -1 would mean unknown
 
 
