@@ -159,12 +159,10 @@ def _labelled_numbering(folder: Path, found: Ints, length: int | None, labels: I
         return Numbering(low)
     # Both readings are possible.
     doubtful = low == 0 or (low > 1 and last <= span) or (low == 1 and last == count < span)
+    doubtful = doubtful or last < low or first > high
     got = f"{count} pictures numbered {low} to {high}, and labels of frames {first} to {last}"
-    expected, remedy = (
-        "pictures and labels with the same numbers",
-        f"{RENAME}: each gets the number of its labels, from 000001",
-    )
-    reject(doubtful or last < low or first > high, folder, got, expected, remedy)
+    remedy = f"{RENAME}: each gets the number of its labels, from 000001"
+    reject(doubtful, folder, got, "pictures and labels with the same numbers", remedy)
     return Numbering()
 
 

@@ -142,10 +142,8 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
     assert len(forms) <= 1, f"detections of one sequence differ in kind: {sorted(forms)}"
     plane, boxed, moving = next(iter(forms), ("image", True, False))
     axes = AXES[: detections[0].pos.shape[1]] if detections else AXES[:2]
-    pos, score = (
-        joined((d.pos for d in detections), len(axes)),
-        joined(scores_or_ones(d.score, len(d.pos)) for d in detections),
-    )
+    pos = joined((d.pos for d in detections), len(axes))
+    score = joined(scores_or_ones(d.score, len(d.pos)) for d in detections)
     frame = np.repeat(np.arange(1, len(detections) + 1, dtype=np.int64), [len(d.pos) for d in detections])
     vel = np.concatenate([d.vel for d in detections if d.vel is not None]) if moving else None
     box = np.concatenate([d.box for d in detections if d.box is not None]) if boxed else None

@@ -190,5 +190,5 @@ def _reader(path: Path) -> Callable[[Path], Camera]:
     if isinstance(document, dict) and not keys.isdisjoint(document):
         return read_opencv
     if isinstance(document, dict) and document.keys().isdisjoint(OWN):
-        reject(True, path, f"the keys {', '.join(document)}"[:100], FORMS, AS_OWN)
+        raise InputError(file=path, got=f"the keys {', '.join(document)}"[:100], expected=FORMS, remedy=AS_OWN)
     return read_camera

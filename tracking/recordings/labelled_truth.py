@@ -29,11 +29,8 @@ RUN = 3.0
 
 def warn_of_places(file: Path, truth: Truth) -> None:
     """Warns if a file's positions and velocities can hardly be on the ground in m and m/s."""
-    if (
-        truth.pos is not None
-        and truth.vel is not None
-        and (doubt := _doubt(truth.frame, truth.id, truth.pos, truth.vel))
-    ):
+    doubt = "" if truth.pos is None or truth.vel is None else _doubt(truth.frame, truth.id, truth.pos, truth.vel)
+    if doubt:
         warnings.warn(f"{file}: positions of people: {doubt}", stacklevel=4)
 
 

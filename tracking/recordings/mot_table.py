@@ -28,7 +28,7 @@ from sim.types import LENGTH_UNITS, Array, Bools, Ints
 from tracking.recordings.options import BoxScale
 from tracking.recordings.worded_cells import TIME_UNITS, in_seconds, instants, numbered
 
-ENOUGH = 10  # rows or steps that are needed to judge by how they vary, or by how many of them something is true
+ENOUGH = 10  # rows that are needed to judge by how their columns vary
 
 LOWEST = 3.0  # px: most boxes of people are higher, unless they are shares of the picture or metres
 
@@ -58,9 +58,10 @@ def reject_missing_ids(rows: NumericTable) -> None:
     # make boxes of people one column earlier only, and the ids do not last.
     score = (values[:, 5] >= 0) & (values[:, 5] <= 1) & (values[:, 4] > 1) & (values[:, 3] > 1)
     earlier = values.shape[1] == 6 and _aspect(values[:, 1:5]) and not _aspect(values[:, 2:6]) and not _lasts(frame, id)
-    missing, got = score.all() or (len(values) >= ENOUGH and earlier), f"in {len(values)} lines what looks like {NO_ID}"
+    missing = score.all() or (len(values) >= ENOUGH and earlier)
+    got = f"in {len(values)} lines what looks like {NO_ID} without an id"
     remedy = f"write {NO_ID} as the first line, if they are these, or -1 as the id"
-    reject(missing, rows.file, f"{got} without an id", "frame,id,left,top,width,height,…", remedy, "columns")
+    reject(missing, rows.file, got, "frame,id,left,top,width,height,…", remedy, "columns")
 
 
 def _aspect(box: Array) -> bool:

@@ -35,20 +35,14 @@ from sim.truth.velocities import differentiate
 from sim.types import Array, Bools, Detections, Ints, Plane, Sequence, Truth, Unscored
 from tracking.recordings.biwi import labels_of
 from tracking.recordings.labelled_truth import warn_of_places, with_labels
-from tracking.recordings.mot_table import (
-    ENOUGH,
-    GROUND_COLUMNS,
-    PEOPLE,
-    MotTable,
-    corner_doubt,
-    read_table,
-    require_pixels,
-)
+from tracking.recordings.mot_table import GROUND_COLUMNS, PEOPLE, MotTable, corner_doubt, read_table, require_pixels
 from tracking.recordings.options import NO_OPTIONS, RATES, BoxOptions, Classes, RecordingOptions
 from tracking.recordings.worded_cells import SHOWN, usual_step
 
 # step in m from one frame to the next that nobody makes. The frame rate may be wrong, so speeds decide nothing.
 LONGEST = 12.0
+
+ENOUGH = 10  # rows or steps that are needed to judge by how many of them something is true
 
 # share of rows at the position of another row of their frame, above which these are no positions of people
 SHARED = 0.1

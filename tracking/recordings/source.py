@@ -164,11 +164,9 @@ def generated_folders(path: Path) -> list[Path]:
     """
     found = _find(path, DEPTH) if path.is_dir() else []
     other = next((p for p in found if _kind(p) != "generated"), None)
-    got, remedy = (
-        "no sequences" if other is None else f"a recording, {other.name}",
-        "give what `flockscope generate` made",
-    )
-    reject(not found or other is not None, path, got, "a generated sequence or dataset", remedy)
+    got = "no sequences" if other is None else f"a recording, {other.name}"
+    wrong, remedy = not found or other is not None, "give what `flockscope generate` made"
+    reject(wrong, path, got, "a generated sequence or dataset", remedy)
     return found
 
 
