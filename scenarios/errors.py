@@ -65,6 +65,12 @@ class WorkError(FlockscopeError):
     """The work failed, or a check was not passed: a command that raises it ends with exit code 1."""
 
 
+def reject(wrong: object, file: object, got: object, expected: object, remedy: str, place: object = "") -> None:
+    """Raises InputError, with these parts, if `wrong` is true."""
+    if wrong:
+        raise InputError(file=file, place=place, got=got, expected=expected, remedy=remedy)
+
+
 class OrderError(WorkError):
     """An order of a scenario's script did not come true with one seed; the scenario may work with others."""
 

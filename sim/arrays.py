@@ -7,6 +7,7 @@ finds ids that stand twice in a frame.
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable
 from dataclasses import fields
 from functools import cache
 from typing import Any, Self
@@ -120,6 +121,11 @@ def _own(value: Any) -> Any:
 def no_ids() -> Ints:
     """Returns an empty array of ids, (0,) int64."""
     return np.zeros(0, np.int64)
+
+
+def joined(parts: Iterable[Any], *shape: int, kind: Any = np.float64) -> Any:
+    """Returns arrays (N, *shape) one behind the other as one of number type `kind`, (0, *shape) for no array."""
+    return np.concatenate([np.zeros((0, *shape), kind), *parts])
 
 
 def repeated_ids(frame: Ints, id: Ints) -> Bools:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import platform
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import fields, is_dataclass
 from functools import cache, lru_cache
 from importlib import metadata
@@ -208,12 +209,10 @@ def versions(drawn: bool) -> dict[str, str]:
 
 def installed(names: Iterable[str]) -> dict[str, str]:
     """Returns the version of each named distribution, by name; "unknown" for one that is not installed."""
-    found = {}
-    for name in names:
-        try:
+    found = dict.fromkeys(names, "unknown")
+    for name in found:
+        with suppress(metadata.PackageNotFoundError):
             found[name] = metadata.version(name)
-        except metadata.PackageNotFoundError:
-            found[name] = "unknown"
     return found
 
 
@@ -223,8 +222,7 @@ def runtime() -> dict[str, str]:
 
     These are the versions of Python, flockscope and all libraries, and under "sources" the `source_hash`.
     """
-    root = Path(__file__).resolve().parents[1]
-    return {**versions(drawn=True), "sources": source_hash(root)}
+    return {**versions(drawn=True), "sources": source_hash(Path(__file__).resolve().parents[1])}
 
 
 def source_hash(root: Path) -> str:

@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import SAMPLE_BYTES
 from sim.pictures.picture_folder import SUFFIXES, read_picture, size_of
 from sim.types import BACKGROUNDS, Image
@@ -52,11 +52,9 @@ class BackgroundChoice:
             self.empty(size)
         if self.count <= min(length, most):
             return self
-        if self.asked:
-            got = f"a recording of {length} frames" if length < self.count else f"pictures of {width}×{height} px"
-            expected = f"{self.count} or more that fit into 2 GB"
-            remedy = f"ask for {min(length, most)} or fewer, or give a longer recording"
-            raise InputError(file=path, place="--background", got=got, expected=expected, remedy=remedy)
+        got = f"a recording of {length} frames" if length < self.count else f"pictures of {width}×{height} px"
+        remedy = f"ask for {min(length, most)} or fewer, or give a longer recording"
+        reject(self.asked, path, got, f"{self.count} or more that fit into 2 GB", remedy, "--background")
         return replace(self, count=min(self.count, length, most))
 
     def empty(self, size: tuple[int, int] | None) -> Image:
@@ -113,10 +111,8 @@ class BackgroundSample:
             if count == 1:
                 found = np.empty((len(wanted), *picture.shape), np.uint8)
             found[count - 1] = picture
-        if not count:
-            got, expected = "no readable picture in the background sample", "at least one"
-            remedy = "choose other frames: --background first:N or spread:N"
-            raise InputError(file=self.path, got=got, expected=expected, remedy=remedy)
+        remedy = "choose other frames: --background first:N or spread:N"
+        reject(not count, self.path, "no readable picture in the background sample", "at least one", remedy)
         if 2 * count < len(wanted):
             words = f"only {count} of the {len(wanted)} frames of the background sample have a readable picture"
             remedy = "number the pictures 1, 2, 3, …, or choose other frames with --background"

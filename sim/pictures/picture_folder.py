@@ -22,7 +22,7 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import FRAMES, fits_picture
 from scenarios.reading import is_present
 from sim.store.own_files import is_hidden
@@ -42,6 +42,7 @@ def declared_size(body: bytes) -> tuple[int, int] | None:
 
 
 FORMATS = ("JPEG", "PNG", "BMP", "TIFF")
+RENAME = "rename the pictures"
 SPARSE = 100  # numbers in file names that use less than 1 of 100 values are time stamps, not frames
 
 # returns the labelled frames, ascending, each once; called only where they decide something
@@ -100,19 +101,18 @@ def frames_of(folder: Path, files: list[Path], numbering: Numbering | None) -> d
     if files and numbers is None:
         raise _wrong(folder, files[0].name, "names with frame numbers")
     found: dict[int, Path] = {}
+    expected = f"frames up to {FRAMES}, numbered from {numbering.origin} in steps of {numbering.step}"
     for number, path in sorted(zip(numbers or (), files, strict=True)):
         before, rest = divmod(number - numbering.origin, numbering.step)
         if before + 1 in found:
             got = f"{found[before + 1].name} and {path.name}"
             raise _wrong(folder, got, "one picture of each frame", "remove one of the two")
-        if rest or not 0 <= before < FRAMES:
-            expected = f"frames up to {FRAMES}, numbered from {numbering.origin} in steps of {numbering.step}"
-            raise _wrong(folder, path.name, expected)
+        reject(rest or not 0 <= before < FRAMES, folder, path.name, expected, RENAME)
         found[before + 1] = path
     return found
 
 
-def _wrong(folder: Path, got: str, expected: str, remedy: str = "rename the pictures") -> InputError:
+def _wrong(folder: Path, got: str, expected: str, remedy: str = RENAME) -> InputError:
     return InputError(file=folder, got=got, expected=expected, remedy=remedy)
 
 
@@ -159,10 +159,10 @@ def _labelled_numbering(folder: Path, found: Ints, length: int | None, labels: I
         return Numbering(low)
     # Both readings are possible.
     doubtful = low == 0 or (low > 1 and last <= span) or (low == 1 and last == count < span)
-    if doubtful or last < low or first > high:
-        got = f"{count} pictures numbered {low} to {high}, and labels of frames {first} to {last}"
-        remedy = "rename the pictures: each gets the number of its labels, from 000001"
-        raise _wrong(folder, got, "pictures and labels with the same numbers", remedy)
+    doubtful = doubtful or last < low or first > high
+    got = f"{count} pictures numbered {low} to {high}, and labels of frames {first} to {last}"
+    remedy = f"{RENAME}: each gets the number of its labels, from 000001"
+    reject(doubtful, folder, got, "pictures and labels with the same numbers", remedy)
     return Numbering()
 
 
@@ -201,9 +201,8 @@ def size_of(picture: NDArray[Any]) -> tuple[int, int]:
 
 def require_size(picture: Picture, size: tuple[int, int], path: Path, place: str = "") -> Picture:
     """Returns the picture unchanged if its (width, height) is `size`, else raises InputError."""
-    if size_of(picture) != size:
-        got, expected = "{}×{} px".format(*size_of(picture)), "{}×{} px like the first".format(*size)
-        raise InputError(file=path, place=place, got=got, expected=expected, remedy="give pictures of one size")
+    got, expected = "{}×{} px".format(*size_of(picture)), "{}×{} px like the first".format(*size)
+    reject(size_of(picture) != size, path, got, expected, "give pictures of one size", place)
     return picture
 
 
@@ -283,9 +282,9 @@ def find_pictures(folder: Path, length: int | None, labelled: Labelled | None) -
 def find_right_pictures(folder: Path, left: PictureFolder) -> PictureFolder:
     """Returns the picture files of the right camera by frame, numbered like those of the left one."""
     files = _picture_files(folder)
-    if files and left.numbering is None and len(files) != len(left.files):
-        got, expected = f"{len(files)} pictures without numbers", f"{len(left.files)}, as in {left.folder.name}"
-        raise _wrong(folder, got, expected, "number the pictures of both cameras")
+    unlike = files and left.numbering is None and len(files) != len(left.files)
+    got, expected = f"{len(files)} pictures without numbers", f"{len(left.files)}, as in {left.folder.name}"
+    reject(unlike, folder, got, expected, "number the pictures of both cameras")
     return PictureFolder(folder, frames_of(folder, files, left.numbering), left.numbering)
 
 

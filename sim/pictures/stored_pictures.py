@@ -17,15 +17,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from sim import hashing, streams
 from sim.pictures import video_files
+from sim.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.pictures.picture_folder import require_size
 from sim.pictures.video_files import write_video
 from sim.store import atomic
 from sim.store.seal import REDO, check_file
 from sim.store.tables import MODAL, read_table, table_bytes, units_of
-from sim.types import Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
+from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Frame, Image, Ints, PixelTruth, Sequence, Truth
 
 JPG_QUALITY = 95
 TABLE = "gt/pixels.parquet"
@@ -52,14 +53,16 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
     assert sequence.image_size is not None, "pictures have a size"
     known, hashes = list[PixelTruth](), {name: hashing.PixelHash() for name in wanted}
     with ExitStack() as stack:
-        movies = {
-            name: stack.enter_context(
-                write_video(folder / streams.file_name(name, images, 1), sequence.image_size, sequence.fps)
-            )
-            for name in wanted if streams.suffix(name, images) == "mp4"
-        }  # fmt: skip
+        movies = {}
+        for name in (name for name in wanted if streams.suffix(name, images) == "mp4"):
+            video = write_video(folder / streams.file_name(name, images, 1), sequence.image_size, sequence.fps)
+            movies[name] = stack.enter_context(video)
 
-        def add(name: str, picture: NDArray[Any]) -> None:
+        def add(name: str, picture: NDArray[Any] | None) -> None:
+            if picture is None:
+                got, remedy = "a sequence without it", "leave the stream out, or give its camera a baseline"
+                file, expected = sequence.name, "a sequence with that stream"
+                raise InputError(file=file, place=f"--streams {name}", got=got, expected=expected, remedy=remedy)
             hashes[name].add(picture)
             if name in movies:
                 movies[name].add(picture)
@@ -68,9 +71,7 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
                 atomic.write_inside(folder / streams.file_name(name, images, hashes[name].count), body)
 
         empty = sequence.background() if "background" in wanted else ()
-        if empty is None:
-            raise _missing(sequence, "background")
-        for picture in empty:
+        for picture in (None,) if empty is None else empty:
             add("background", picture)
         for frame in sequence if {"left", "right"} & hashes.keys() else sequence.without_pictures():
             pixels = None if sequence.load_pixels is None else sequence.load_pixels(frame.index)
@@ -83,23 +84,13 @@ def write_pictures(folder: Path, sequence: Sequence, wanted: tuple[str, ...], im
     return {name: pixels.hex() for name, pixels in hashes.items()}
 
 
-def _picture(name: str, sequence: Sequence, frame: Frame, pixels: PixelTruth | None) -> NDArray[Any]:
-    """Returns a frame's picture of a stream; InputError without one."""
-    picture: NDArray[Any] | None = {"left": frame.image, "right": frame.right}.get(name)
+def _picture(name: str, sequence: Sequence, frame: Frame, pixels: PixelTruth | None) -> NDArray[Any] | None:
+    """Returns a frame's picture of a stream; None without one."""
     if name == "ids" and pixels is not None:
-        picture = streams.encode_ids(pixels.ids)
+        return streams.encode_ids(pixels.ids)
     if name == "disparity" and pixels is not None and pixels.disparity is not None:
-        picture = streams.encode_disparity(pixels.disparity, sequence.camera)
-    if picture is None:
-        raise _missing(sequence, name)
-    return picture
-
-
-def _missing(sequence: Sequence, stream: str) -> InputError:
-    return InputError(
-        file=sequence.name, place=f"--streams {stream}", got="a sequence without it",
-        expected="a sequence with that stream", remedy="leave the stream out, or give its camera a baseline",
-    )  # fmt: skip
+        return streams.encode_disparity(pixels.disparity, sequence.camera)
+    return {"left": frame.image, "right": frame.right}.get(name)
 
 
 def pixel_table(truth: Truth, known: list[PixelTruth]) -> bytes:
@@ -139,16 +130,10 @@ class StoredPictures:
         """File type of the pictures; "png" if there are none, or only 16-bit streams (ids, disparity)."""
         return self.manifest.get("images") or "png"
 
-    def body(self, name: str) -> bytes:
-        """Returns the bytes of a file; raises InputError if they differ from the hash in the manifest."""
-        return self.check(name, whole=True)
-
     def check(self, name: str, whole: bool = False) -> bytes:
         """Raises InputError if a file differs from its hash in the manifest. Returns its bytes if `whole`, else b""."""
         path, files = self.folder / name, self.manifest["files"]
-        if name not in files:
-            got, expected = "a manifest that does not name it", "a file that manifest.json names"
-            raise InputError(file=path, got=got, expected=expected, remedy=REDO)
+        reject(name not in files, path, "a manifest that does not name it", "a file that manifest.json names", REDO)
         return check_file(path, files[name], whole=whole)
 
     def one(self, stream: str, index: int) -> NDArray[Any]:
@@ -157,7 +142,7 @@ class StoredPictures:
 
         name = streams.file_name(stream, self.images, index)
         mode = cv2.IMREAD_UNCHANGED if stream in streams.EXACT else cv2.IMREAD_COLOR
-        body = self.body(name)
+        body = self.check(name, whole=True)
         picture = cv2.imdecode(np.frombuffer(body, np.uint8), mode) if body else None  # OpenCV refuses no bytes
         if picture is None or picture.dtype != (np.uint16 if stream in streams.EXACT else np.uint8):
             raise InputError(file=self.folder / name, got="no readable picture", expected="a picture", remedy=REDO)
@@ -177,16 +162,26 @@ class StoredPictures:
         name, found = streams.file_name(stream, self.images, 1), 0
         path = self.folder / name
         self.check(name)
-        for found, (_, picture) in enumerate(
-            video_files.decode_frames(path, video_files.index_packets(path), wanted), 1
-        ):
+        frames = video_files.decode_frames(path, video_files.index_packets(path), wanted)
+        for found, (_, picture) in enumerate(frames, 1):
             yield require_size(picture, self.size, path, f"frame {found}")
-        if found != (count if wanted is None else len(wanted)):
-            raise InputError(file=path, got=f"{found} pictures", expected=count, remedy=REDO)
+        reject(found != (count if wanted is None else len(wanted)), path, f"{found} pictures", count, REDO)
 
     def sample(self, wanted: list[int]) -> Iterable[tuple[int, Image]]:
         """Yields (frame, picture) of the left camera for the frames `wanted` (from 1, ascending)."""
         return zip(wanted, self.all("left", self.manifest["sequence"]["length"], wanted), strict=True)
+
+    def background(self, choice: BackgroundChoice | None) -> tuple[Callable[[], Image] | None, dict[str, str]]:
+        """Returns (loader of background pictures, entry for `Sequence.source`); (None, {}) if there are none."""
+        if choice is not None:
+            remedy = "leave it out: it has none"
+            reject("left" not in self.streams, self.folder, "--background", "none for one without pictures", remedy)
+            length = self.manifest["sequence"]["length"]
+            fits = choice.of(length, self.folder, self.size)
+            return BackgroundSample(fits, length, self.folder, self.sample), {"background": str(fits)}
+        if "background" not in self.streams:
+            return None, {}
+        return (lambda: np.stack(list(self.all("background", BACKGROUNDS)))), {"background": OWN_BACKGROUND}
 
     def pixel_loader(self) -> Callable[[int], PixelTruth]:
         """Returns a function that gives the PixelTruth of a frame (from 1). The stream "ids" must be stored."""

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError, WorkError
+from scenarios.errors import InputError, WorkError, reject
 from scenarios.limits import FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.reading import require_regular
 from sim.pictures.picture_folder import require_size
@@ -68,9 +68,8 @@ class PacketIndex:
         ranks = self.ranks()
         if ranks is None:
             return None
-        return {
-            g for g, stamp in zip(self.group, self.stamps, strict=True) if stamp is not None and ranks[stamp] in wanted
-        }
+        packets = zip(self.group, self.stamps, strict=True)
+        return {group for group, stamp in packets if stamp is not None and ranks[stamp] in wanted}
 
 
 @contextmanager
@@ -86,9 +85,8 @@ def open_stream(path: Path) -> Iterator[tuple[Any, Any]]:
         raise InputError(file=path, got=got, expected="a whole video file", remedy=REMEDY) from None
     with container:
         streams = [s for s in container.streams.video if COVER not in str(getattr(s, "disposition", "")).lower()]
-        if not streams or streams[0].codec_context is None:
-            got = "an unknown codec" if streams else "no video stream"
-            raise InputError(file=path, got=got, expected="a video stream, as of H.264", remedy=REMEDY)
+        got = "an unknown codec" if streams else "no video stream"
+        reject(not streams or streams[0].codec_context is None, path, got, "a video stream, as of H.264", REMEDY)
         stream = streams[0]
         width, height = stream.codec_context.width, stream.codec_context.height
         if not fits_picture(width, height) or not fits_picture(*square_size(width, height, _aspect(stream))):
@@ -117,9 +115,7 @@ def index_packets(path: Path) -> PacketIndex:
                 hidden += p.is_discard  # as of the frames before a cut, which only an edit list leaves out
                 if p.size and not p.is_discard and (not vp8 or bytes(p)[0] & SHOWN):
                     found.append((p.pts, group))
-                if len(found) > FRAMES:
-                    got, expected = f"more than {FRAMES} frames", f"at most {FRAMES}"
-                    raise InputError(file=path, got=got, expected=expected, remedy="cut the video")
+                reject(len(found) > FRAMES, path, f"more than {FRAMES} frames", f"at most {FRAMES}", "cut the video")
         except av.FFmpegError as error:
             broken = _reason(error)
         return PacketIndex(
@@ -216,9 +212,8 @@ def write_video(
     """
     import av
 
-    if size[0] % 2 or size[1] % 2:
-        got, remedy = "pictures of {}×{} px".format(*size), "take --images jpg or png, or another camera.image"
-        raise InputError(place="--images mp4", got=got, expected="an even width and height", remedy=remedy)
+    got, remedy = "pictures of {}×{} px".format(*size), "take --images jpg or png, or another camera.image"
+    reject(size[0] % 2 or size[1] % 2, "", got, "an even width and height", remedy, "--images mp4")
     path.write_bytes(b"")  # libav makes no file without pictures
     with av.open(media_url(path), "w", format="mp4", options={"movflags": "faststart"}) as container:
         if comment:

@@ -8,10 +8,10 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, Field
 
-from scenarios.errors import InputError
+from scenarios.errors import reject
 from sim.scene.camera import require_camera
 from sim.store import tables
-from sim.store.tables import Number, Pair, Triple, validated
+from sim.store.tables import Number, Pair, Triple
 from sim.types import Camera, Scene
 
 Pixels = Annotated[float, Field(strict=True, multiple_of=1)]
@@ -25,23 +25,14 @@ def camera_document(camera: Camera) -> dict[str, Any]:
     return document
 
 
-class _Camera(BaseModel):
-    kind: Literal["pinhole", "top"]
-    image: tuple[Pixels, Pixels]
-    focal_px: Pair
-    centre_px: Pair
-    position: Triple
-    rotation: tuple[Triple, Triple, Triple]
-    baseline: Number = 0.0
-    px_per_m: Number | None = None
-    radial: Number = 0.0
-
-
 def read_camera(path: Path) -> Camera:
     """Returns the Camera in a camera.json; missing baseline and radial are 0, a missing px_per_m is nan."""
-    found = validated(path, tables.read_document(path, "give a camera.json"), _Camera, "correct it")
-    if found.px_per_m is None and found.kind == "top":
-        raise InputError(file=path, place="px_per_m", got="null", expected="a scale for kind top", remedy="add it")
+    found = tables.read_values(
+        path, "correct it", "give a camera.json", kind=Literal["pinhole", "top"], image=tuple[Pixels, Pixels],
+        focal_px=Pair, centre_px=Pair, position=Triple, rotation=tuple[Triple, Triple, Triple],
+        baseline=(Number, 0.0), px_per_m=(Number | None, None), radial=(Number, 0.0),
+    )  # fmt: skip
+    reject(found.px_per_m is None and found.kind == "top", path, "null", "a scale for kind top", "add it", "px_per_m")
     camera = Camera(
         found.kind, (int(found.image[0]), int(found.image[1])), found.focal_px, found.centre_px,
         np.array(found.position), np.array(found.rotation), found.baseline, tables.none_to_nan(found.px_per_m),
@@ -64,18 +55,11 @@ class _Stairs(BaseModel):
     landing: Number
 
 
-class _Scene(BaseModel):
-    size: Pair
-    walls: list[tuple[Pair, Pair]]
-    pillars: list[Triple]
-    doors: list[tuple[Pair, Pair]]
-    service: list[Pair]
-    stairs: list[_Stairs]
-    wall_height: Number
-    pillar_height: Number
-
-
 def read_scene(path: Path) -> Scene:
     """Returns the Scene in a scene.json."""
-    found = validated(path, tables.read_document(path), _Scene, "correct it")
+    segments = list[tuple[Pair, Pair]]
+    found = tables.read_values(
+        path, "correct it", size=Pair, walls=segments, pillars=list[Triple], doors=segments, service=list[Pair],
+        stairs=list[_Stairs], wall_height=Number, pillar_height=Number,
+    )  # fmt: skip
     return Scene.of(found, found.walls, found.doors)

@@ -20,9 +20,10 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
-from scenarios.errors import InputError
+from scenarios.errors import reject
 from scenarios.limits import COORDINATE, FRAMES, INTEGER
 from scenarios.reading import is_present
+from sim.arrays import joined, no_ids
 from sim.store import tables
 from sim.store.numeric_text import is_number_text, read_number, read_rows, read_text, whole_or_number
 from sim.store.tables import AXES, EXTENT, Count, FrameNumber, Id, Number, Pair, StoredTable, along, validated
@@ -51,13 +52,9 @@ class _Event(BaseModel):
         return self
 
 
-class _Events(BaseModel):
-    events: list[_Event]
-
-
 def read_events(path: Path) -> list[tuple[GroupEvent, int | None]]:
     """Returns the events of an events.json as pairs: the event, and the frame whose tracks reported it or None."""
-    found = validated(path, tables.read_document(path), _Events, "correct the event").events
+    found = tables.read_values(path, "correct the event", events=list[_Event]).events
     places = [(tables.none_to_nan(e.pos[0]), tables.none_to_nan(e.pos[1])) for e in found]
     fields = [e.model_dump(exclude={"frame", "pos"}) for e in found]
     return [(GroupEvent(**f, pos=pos), e.frame) for f, pos, e in zip(fields, places, found, strict=True)]
@@ -67,8 +64,7 @@ def read_near(path: Path) -> Near:
     """Returns the hard negatives in a near.csv; raises InputError for a wrong line."""
     text = read_rows(path)
     header = "".join(text.text[:1])
-    if header != NEAR_COLUMNS:
-        raise _bad(path, 1, repr(header), NEAR_COLUMNS)
+    _require(header == NEAR_COLUMNS, path, 1, repr(header), NEAR_COLUMNS)
     rows = text.numbers((4,), first=1, layout=NEAR_COLUMNS)
     start, end, a, b = (rows.integers(k, name) for k, name in enumerate(NEAR_COLUMNS.split(",")))
     wrong = (start < 1) | (end < start) | (end > FRAMES) | (np.minimum(a, b) < 0)
@@ -87,26 +83,17 @@ class _Order(BaseModel):
     event: Id | None = None
 
 
-class _Orders(BaseModel):
-    orders: tuple[_Order, ...] = ()
-
-
 def read_script(path: Path) -> tuple[Order, ...]:
     """Returns the orders in a script.json; () if it has no list of orders."""
-    found = validated(path, tables.read_document(path), _Orders, "restore it").orders
-    return tuple(Order(**order.model_dump()) for order in found)
-
-
-class _AllNeverArrive(BaseModel):
-    groups: tuple[NeverArrives, ...]
+    found = tables.read_values(path, "restore it", orders=(tuple[_Order, ...], ()))
+    return tuple(Order(**order.model_dump()) for order in found.orders)
 
 
 def read_never_arrives(folder: Path) -> tuple[NeverArrives, ...]:
     """Returns the groups of a sequence folder that do not reach their goal; () if it has no such file."""
     path = folder / NEVER_ARRIVES
-    if not is_present(path):
-        return ()
-    return validated(path, tables.read_document(path), _AllNeverArrive, "restore it").groups
+    kind = tuple[NeverArrives, ...]
+    return tables.read_values(path, "restore it", groups=kind).groups if is_present(path) else ()
 
 
 CSV_COLUMNS = ("frame", "group", "members", "x", "y", "hull", "size")
@@ -124,13 +111,12 @@ def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
     axes = AXES[: known[0].pos.shape[1]] if known else AXES[:2]
     counts = [0 if g is None else len(g.id) for g in frames]
     ids = [g.id for g in known]
-    members = _lists([g.members for g in known], ids, np.zeros(0, np.int64))
+    members = _lists([g.members for g in known], ids, no_ids())
     columns: tables.Columns = {
         "frame": np.repeat(np.arange(first, first + len(frames), dtype=np.int64), counts),
-        "group": np.concatenate([np.zeros(0, np.int64), *ids]), "members": pa.array(members, pa.list_(pa.int64())),
-        axes: _stack([g.pos for g in known], len(axes)), along(axes): _stack([g.vel for g in known], len(axes)),
-        EXTENT: _stack([g.extent.reshape(-1, 4) for g in known], 4),
-        "size": np.concatenate([np.zeros(0), *(g.size for g in known)]),
+        "group": joined(ids, kind=np.int64), "members": pa.array(members, pa.list_(pa.int64())),
+        axes: joined((g.pos for g in known), len(axes)), along(axes): joined((g.vel for g in known), len(axes)),
+        EXTENT: joined((g.extent.reshape(-1, 4) for g in known), 4), "size": joined(g.size for g in known),
         "hull": pa.array(_lists([g.hull for g in known], ids, np.zeros(0)), pa.list_(pa.float64())),
     }  # fmt: skip
     missing = [first + k for k, g in enumerate(frames) if g is None]
@@ -144,20 +130,9 @@ def _lists(rows: list[tuple[Any, ...]], ids: list[Ints], empty: NDArray[Any]) ->
     return [np.asarray(item, empty.dtype).ravel() for item in every]
 
 
-def _stack(parts: list[Array], width: int) -> Array:
-    return np.concatenate([np.zeros((0, width)), *parts])
-
-
-class _GroupFacts(BaseModel):
-    first: Count
-    frames: Count
-    missing: set[int]
-    memberless: set[int]
-
-
 def read_groups(table: StoredTable) -> list[Groups | None]:
     """Returns the Groups of each frame stored in a groups.parquet; None for a frame whose groups are unknown."""
-    facts = table.facts_as(_GroupFacts)
+    facts = table.facts_as(first=Count, frames=Count, missing=set[int], memberless=set[int])
     first, count = facts.first, facts.frames
     axes = AXES if "z" in table.columns else AXES[:2]
     id, size = table.ints("group"), table.floats("size")
@@ -165,13 +140,12 @@ def read_groups(table: StoredTable) -> list[Groups | None]:
     extent = table.floats(*EXTENT).reshape(-1, 2, 2)
     members, flat = table.lists("members", np.int64), table.lists("hull", np.float64)
     table.reject(any(len(h) % 2 for h in flat), "hull", "half a vertex", "x and y of each vertex")
-    hulls, cuts = [h.reshape(-1, 2) for h in flat], table.cuts(first, count)
+    hulls = [h.reshape(-1, 2) for h in flat]
     found: list[Groups | None] = []
-    for k in range(count):
-        r = slice(int(cuts[k]), int(cuts[k + 1]))
-        who = () if first + k in facts.memberless else tuple(members[r])
+    for k, r in enumerate(table.cuts(first, count), first):
+        who = () if k in facts.memberless else tuple(members[r])
         some = Groups(id[r], who, pos[r], vel[r], extent[r], size[r], tuple(hulls[r]))
-        found.append(None if first + k in facts.missing else some)
+        found.append(None if k in facts.missing else some)
     return found
 
 
@@ -226,10 +200,6 @@ def _ids(text: str | None) -> list[Any]:
     return [whole_or_number(word) for word in (text or "").split()]
 
 
-def _hull(text: str | None) -> Any:
-    return parse_wkt(text) if text else ()
-
-
 class _GroupRow(BaseModel):
     """A row of groups.csv."""
 
@@ -238,7 +208,7 @@ class _GroupRow(BaseModel):
     members: Annotated[list[Id], BeforeValidator(_ids)]
     x: Annotated[Number | None, BeforeValidator(_value)] = None
     y: Annotated[Number | None, BeforeValidator(_value)] = None
-    hull: Annotated[tuple[Pair, ...], BeforeValidator(_hull)] = ()
+    hull: Annotated[tuple[Pair, ...], BeforeValidator(lambda text: parse_wkt(text) if text else ())] = ()
     size: Annotated[Annotated[Number, Field(ge=0)] | None, BeforeValidator(_value)] = None
 
 
@@ -251,17 +221,16 @@ def read_groups_csv(path: Path, length: int) -> list[Groups]:
     frames: dict[int, dict[int, _GroupRow]] = {k: {} for k in range(1, length + 1)}
     try:
         wanted = [c for c in CSV_COLUMNS[:6] if c not in (reader.fieldnames or [])]
-        if wanted:
-            raise _bad(path, 1, f"no column {', '.join(wanted)}", ",".join(CSV_COLUMNS))
+        _require(not wanted, path, 1, f"no column {', '.join(wanted)}", ",".join(CSV_COLUMNS))
         for cells in reader:
             given = {name: cell for name, cell in cells.items() if name and cell is not None}
             row = validated(path, given, _GroupRow, "correct the line", f"line {reader.line_num}")
-            if row.frame > length or row.group in frames[row.frame]:
-                got, expected = f"group {row.group} in frame {row.frame}", f"frames to {length}, each group once in one"
-                raise _bad(path, reader.line_num, got, expected)
+            got, expected = f"group {row.group} in frame {row.frame}", f"frames to {length}, each group once in one"
+            once = row.frame <= length and row.group not in frames[row.frame]
+            _require(once, path, reader.line_num, got, expected)
             frames[row.frame][row.group] = row
     except csv.Error as error:
-        raise _bad(path, reader.line_num, str(error), "cells of text") from None
+        _require(False, path, reader.line_num, str(error), "cells of text")
     nobody = Groups.none()
     return [_from_rows([rows[id] for id in sorted(rows)]) if rows else nobody for rows in frames.values()]
 
@@ -277,5 +246,5 @@ def _from_rows(rows: list[_GroupRow]) -> Groups:
     )  # fmt: skip
 
 
-def _bad(path: Path, line: int, got: str, expected: str) -> InputError:
-    return InputError(file=path, place=f"line {line}", got=got, expected=expected, remedy="correct the line")
+def _require(right: bool, path: Path, line: int, got: str, expected: str) -> None:
+    reject(not right, path, got, expected, "correct the line", f"line {line}")

@@ -14,7 +14,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import COORDINATE, DETECTIONS, FRAMES, TEXT_BYTES, XML_BYTES
 from scenarios.reading import read_regular
 from sim.types import Array, Bools, Ints
@@ -23,6 +23,7 @@ NAME_THEM = "name the columns in the first line, as frame,id,x,y or frame,id,lef
 
 LARGEST = 2**52  # whole numbers pass through float64
 CORRECT = "remove or correct it"
+OFFSET = "subtract one position near the people from all, if these are geographic, as UTM; else check the columns"
 
 
 @dataclass(frozen=True)
@@ -79,10 +80,7 @@ class NumericTable:
         crowded = np.bincount(frame, minlength=1)[frame] > DETECTIONS
         self.reject(crowded, f"at most {DETECTIONS} {self.unit}s of one frame", "check that this is the right file")
         far = ~(np.abs(self.values[:, 2:]) <= COORDINATE).all(axis=1)  # also nan
-        offset = (
-            "subtract one position near the people from all, if these are geographic, as UTM; else check the columns"
-        )
-        self.reject(far, f"numbers within {COORDINATE:g}", CORRECT, offset)
+        self.reject(far, f"numbers within {COORDINATE:g}", CORRECT, OFFSET)
 
 
 def read_text(path: Path, limit: int = TEXT_BYTES) -> str:
@@ -226,10 +224,9 @@ def number_or_nan(text: str | None) -> float:
 def bounded_number(path: Path, place: str, text: str | None, low: float, high: float, whole: bool = False) -> float:
     """Returns the number that a text states; InputError unless from `low` to `high` and, if `whole`, a whole number."""
     value = number_or_nan(text)
-    if not low <= value <= high or (whole and value % 1):
-        got = "nothing" if text is None else repr(text)
-        expected = f"a {'whole ' if whole else ''}number from {low:.12g} to {high:.12g}"
-        raise InputError(file=path, place=place, got=got, expected=expected, remedy="correct it")
+    got = "nothing" if text is None else repr(text)
+    expected = f"a {'whole ' if whole else ''}number from {low:.12g} to {high:.12g}"
+    reject(not low <= value <= high or (whole and value % 1), path, got, expected, "correct it", place)
     return value
 
 

@@ -20,7 +20,7 @@ from contextlib import suppress
 from pathlib import Path, PurePath
 from urllib.parse import quote
 
-from scenarios.errors import InputError, is_control
+from scenarios.errors import InputError, is_control, reject
 from sim.store import tables
 
 NAMES = frozenset({"__macosx", ".ds_store", "thumbs.db", "ehthumbs.db", "desktop.ini", "@eadir", "icon\r"})
@@ -47,11 +47,8 @@ COMMENT = f"# {GENERATOR} ".encode()  # beginning of our TOML files
 IHDR_END = 33  # bytes of a PNG file up to the end of its first chunk
 
 
-def _chunk(kind: bytes, content: bytes) -> bytes:
-    return struct.pack(">I", len(content)) + kind + content + struct.pack(">I", zlib.crc32(kind + content))
-
-
-SOFTWARE = _chunk(b"tEXt", b"Software\0" + GENERATOR.encode())  # the second chunk of our PNG files
+TEXT = b"tEXtSoftware\0" + GENERATOR.encode()  # kind and content of the second chunk of our PNG files
+SOFTWARE = struct.pack(">I", len(TEXT) - 4) + TEXT + struct.pack(">I", zlib.crc32(TEXT))
 
 
 def marked_png(picture: bytes) -> bytes:
@@ -89,17 +86,16 @@ def is_ours(path: Path, marks: Marks | None = None) -> bool | None:
 
 def refuse_foreign_file(path: Path, marks: Marks | None = None, option: str = "--out") -> None:
     """Raises InputError if something is at `path` that flockscope did not write. marks: as for `is_ours`."""
-    if path.exists() and not is_ours(path, marks):
-        got, expected = "a file that flockscope did not write", "its own file, or none"
-        raise InputError(file=path, got=got, expected=expected, remedy=f"move it away, or choose another {option}")
+    got, expected = "a file that flockscope did not write", "its own file, or none"
+    foreign = path.exists() and not is_ours(path, marks)
+    reject(foreign, path, got, expected, f"move it away, or choose another {option}")
 
 
 def output_file(out: Path, suffix: str, option: str = "--out") -> Path:
     """Returns `out` if it is a file name with this suffix, and no .toml of others; else raises InputError."""
-    if out.is_dir() or out.suffix.lower() != suffix:
-        got, better = (f"{out}, a folder", out / "page") if out.is_dir() else (str(out), out.with_suffix(""))
-        expected = f"a file that ends in {suffix}"
-        raise InputError(place=option, got=got, expected=expected, remedy=f"write {better}{suffix}")
+    wrong = out.is_dir() or out.suffix.lower() != suffix
+    got, better = (f"{out}, a folder", out / "page") if out.is_dir() else (str(out), out.with_suffix(""))
+    reject(wrong, "", got, f"a file that ends in {suffix}", f"write {better}{suffix}", option)
     if suffix == ".toml":  # Scenarios and parameters are written by hand, too.
         refuse_foreign_file(out)
     return out

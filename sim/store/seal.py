@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, Field, StrictBool
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import INTEGER, PICTURE_SIZES, fits_picture
 from sim import hashing
 from sim.store import tables
@@ -61,13 +61,6 @@ class _Facts(BaseModel):
     bytes: Id
 
 
-class _Sealed(BaseModel):
-    """The keys of each seal that are checked."""
-
-    files: dict[Annotated[str, AfterValidator(_inside)], _Facts]
-    truth_hash: str | None = None
-
-
 class _SequenceFacts(BaseModel):
     name: str
     fps: Rate
@@ -76,37 +69,22 @@ class _SequenceFacts(BaseModel):
     px_per_m: Scale | None
 
 
-class _Manifest(_Sealed):
-    """The keys of manifest.json that readers use."""
-
-    format: Any
-    sequence: _SequenceFacts
-    seed: Id
-    repeat: Id
-    truth_hash: str
-    content_hash: str
-    scenario_hash: str
-    streams: tuple[Literal[STREAMS], ...] = ()  # type: ignore[valid-type]
-    images: Literal[IMAGES] | None = None  # type: ignore[valid-type]
-    stride: FrameNumber = 1
-
-
-class _Run(_Sealed):
-    """The keys of run.json that commands read."""
-
-    boxes: Literal["measured", "projected", "none"]
-    tracker: str = ""
-    sequence: str = ""
-    config: dict[str, Any] | None = None
-    grouping: dict[str, Any] | None = None
-    sensor: dict[str, Any] | None = None
-    seed: Annotated[int, Field(strict=True, ge=-INTEGER, le=INTEGER)] | None = None
-    detections: str | None = None
-    background: str | None = None
-    plane: str | None = None
-    causal: StrictBool | None = None
-    fps: Rate | None = None
-    px_per_m: Annotated[float, Field(strict=True)] | None = None
+FILES = dict[Annotated[str, AfterValidator(_inside)], _Facts]
+TABLE = (dict[str, Any] | None, None)
+TEXT = (str | None, None)
+# the keys of manifest.json that readers use, and those of run.json that commands read
+MANIFEST_KEYS = tables.model(
+    files=FILES, truth_hash=str, format=Any, sequence=_SequenceFacts, seed=Id, repeat=Id, content_hash=str,
+    scenario_hash=str, streams=(tuple[Literal[STREAMS], ...], ()),  # type: ignore[valid-type]
+    images=(Literal[IMAGES] | None, None), stride=(FrameNumber, 1),
+)  # fmt: skip
+RUN_KEYS = tables.model(
+    files=FILES, truth_hash=TEXT, boxes=Literal["measured", "projected", "none"], tracker=(str, ""), sequence=(str, ""),
+    config=TABLE, grouping=TABLE, sensor=TABLE,
+    seed=(Annotated[int, Field(strict=True, ge=-INTEGER, le=INTEGER)] | None, None),
+    detections=TEXT, background=TEXT, plane=TEXT, causal=(StrictBool | None, None), fps=(Rate | None, None),
+    px_per_m=(Annotated[float, Field(strict=True)] | None, None),
+)  # fmt: skip
 
 
 def file_facts(files: Mapping[str, bytes | Path]) -> dict[str, dict[str, Any]]:
@@ -121,8 +99,8 @@ def with_hash(document: dict[str, Any]) -> dict[str, Any]:
     return {**body, "sha256": hashing.canonical_hash(body)}
 
 
-def _read(path: Path, kind: type[_Sealed], remedy: str) -> dict[str, Any]:
-    document = tables.read_document(path, OLD if kind is _Run else remedy)
+def _read(path: Path, kind: type[BaseModel], remedy: str) -> dict[str, Any]:
+    document = tables.read_document(path, OLD if kind is RUN_KEYS else remedy)
     if document.get("sha256") != with_hash(document)["sha256"]:
         raise InputError(file=path, got="altered fields", expected="those that its sha256 names", remedy=remedy)
     validated(path, document, kind, remedy)
@@ -199,12 +177,10 @@ def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (),
 def read_manifest(folder: Path) -> dict[str, Any]:
     """Returns the manifest.json of a sequence folder; checks its own hash and its values, but no other file."""
     path = folder / MANIFEST
-    if not path.is_file():
-        raise InputError(file=path, got="missing", expected="the manifest of a complete sequence", remedy=REDO)
-    manifest = _read(path, _Manifest, REDO)
-    if manifest.get("streams") and manifest["sequence"]["image_size"] is None:
-        expected = "the size of the pictures"
-        raise InputError(file=path, place="sequence.image_size", got="null", expected=expected, remedy=REDO)
+    reject(not path.is_file(), path, "missing", "the manifest of a complete sequence", REDO)
+    manifest = _read(path, MANIFEST_KEYS, REDO)
+    unsized = manifest.get("streams") and manifest["sequence"]["image_size"] is None
+    reject(unsized, path, "null", "the size of the pictures", REDO, "sequence.image_size")
     return manifest
 
 
@@ -218,14 +194,12 @@ def read_whole_manifest(folder: Path) -> dict[str, Any]:
         wanted += [file_name(stream, images, k) for k in range(1, count + 1)]
     expected = "every file of the sequence"
     first, *more = [name for name in wanted if name not in manifest["files"]] or [""]
-    if first:
-        got = f"no {first}" + (f" and {len(more)} more" if more else "")
-        raise InputError(file=folder / MANIFEST, place="files", got=got, expected=expected, remedy=REDO)
+    got = f"no {first}" + (f" and {len(more)} more" if more else "")
+    reject(first, folder / MANIFEST, got, expected, REDO, "files")
     # A stranger's dataset must not make an export read files elsewhere.
+    got, remedy = "a link that leads out of the sequence", "export a copy that holds the files (cp -rL)"
     for path in (folder / name for name in (MANIFEST, *manifest["files"])):
-        if not path.resolve().is_relative_to(folder.resolve()):
-            got, remedy = "a link that leads out of the sequence", "export a copy that holds the files (cp -rL)"
-            raise InputError(file=path, got=got, expected=expected, remedy=remedy)
+        reject(not path.resolve().is_relative_to(folder.resolve()), path, got, expected, remedy)
     return manifest
 
 
@@ -254,9 +228,8 @@ def reject_foreign(folder: Path) -> None:
 def reject_dataset(folder: Path) -> None:
     """Raises InputError if `folder` is a dataset or lies in a stored sequence, where no tracks or tables belong."""
     place = next((p for p in (folder.absolute(), *folder.absolute().parents) if is_ours(p / MANIFEST, MARKS)), None)
-    if place is not None or is_dataset(folder):
-        got = "a generated dataset" if place is None else f"a place inside the stored sequence {place.name}"
-        raise InputError(file=folder, got=got, expected=FOR_RUNS, remedy=ANOTHER)
+    got = "a generated dataset" if place is None else f"a place inside the stored sequence {place.name}"
+    reject(place is not None or is_dataset(folder), folder, got, FOR_RUNS, ANOTHER)
 
 
 def reject_runs(folder: Path) -> None:
@@ -267,25 +240,23 @@ def reject_runs(folder: Path) -> None:
 
 def reject_sealed(folder: Path) -> None:
     """Raises InputError if `folder` is that of a run or of a stored sequence, into which no export is written."""
-    if is_run(folder) or is_ours(folder / MANIFEST, MARKS):
-        got = "a folder of tracks or of a sequence"
-        raise InputError(file=folder, place="--out", got=got, expected="another folder", remedy=ANOTHER)
+    sealed = is_run(folder) or is_ours(folder / MANIFEST, MARKS)
+    reject(sealed, folder, "a folder of tracks or of a sequence", "another folder", ANOTHER, "--out")
 
 
 def sealed_run(info: Mapping[str, Any], files: Mapping[str, bytes]) -> bytes:
     """Returns the content of run.json: `info`, size and hash of each of `files` (content by name), its own hash."""
     stated = {"format": tables.FORMAT, **info, "files": file_facts(files)}
     read = json.loads(tables.json_text(stated))  # hashed as it will be read
-    validated(Path(RUN), read, _Run, "correct info")
+    validated(Path(RUN), read, RUN_KEYS, "correct info")
     return tables.json_document(with_hash(read))
 
 
 def read_run(folder: Path) -> dict[str, Any]:
     """Returns the run.json of a folder, with its own hash checked; no other file is read."""
-    if not (folder / RUN).is_file():
-        got, expected = f"tracks without {RUN}", "a run that was finished"
-        raise InputError(file=folder, got=got, expected=expected, remedy=f"incomplete: {AGAIN}")
-    return _read(folder / RUN, _Run, AGAIN)
+    got, expected = f"tracks without {RUN}", "a run that was finished"
+    reject(not (folder / RUN).is_file(), folder, got, expected, f"incomplete: {AGAIN}")
+    return _read(folder / RUN, RUN_KEYS, AGAIN)
 
 
 def run_problems(folder: Path, run: dict[str, Any]) -> Iterator[InputError]:

@@ -12,12 +12,10 @@ from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from scenarios.errors import InputError, printable
+from scenarios.errors import InputError, printable, reject
 from sim import hashing
 from sim.hashing import versions
-from sim.pictures.background_sample import BackgroundChoice, BackgroundSample
+from sim.pictures.background_sample import BackgroundChoice
 from sim.pictures.stored_pictures import StoredPictures, write_pictures
 from sim.store import atomic, seal, tables, truth_files
 from sim.store.camera_files import camera_document, read_camera, read_scene, scene_document
@@ -26,7 +24,7 @@ from sim.store.own_files import is_side_file
 from sim.store.recorded_sequence import recorded_sequence
 from sim.store.seal import MANIFEST, REDO, is_own_sequence, read_manifest
 from sim.streams import check_streams, coding, is_picture
-from sim.types import BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Image, Sequence, Truth
+from sim.types import Array, Detections, Sequence, Truth
 
 NOTHING: Mapping[str, Any] = {}
 
@@ -60,9 +58,7 @@ def write_sequence(
         assert truth is None or truth.length == sequence.length
         pixels = write_pictures(partial, sequence, wanted, images)
         pictures = {path.relative_to(partial).as_posix(): path for path in partial.rglob("*") if path.is_file()}
-        files = sequence_files(
-            sequence, scenario=scenario, seed=seed, repeat=repeat, images=images, pixels=pixels, pictures=pictures
-        )
+        files = sequence_files(sequence, scenario, seed, repeat, images, pixels, pictures)
         for name, body in files.items():
             atomic.write_inside(partial / name, body)
         names |= {*files, *pictures}
@@ -83,7 +79,7 @@ def _refuse_foreign(folder: Path, names: set[str]) -> bool:
 
 
 def sequence_files(
-    sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, images: str = "jpg",
+    sequence: Sequence, scenario: str, seed: int, repeat: int = 0, images: str = "jpg",
     pixels: Mapping[str, str] = NOTHING, pictures: Mapping[str, Path] = NOTHING,
 ) -> dict[str, bytes]:  # fmt: skip
     """Returns the files of a sequence except its pictures: content by name, the manifest last.
@@ -127,9 +123,8 @@ def _seqinfo(sequence: Sequence, length: int, images: str | None) -> bytes:
     lines = ["[Sequence]", f"name={printable(sequence.name)}", "imDir=img1"]
     lines += [f"frameRate={str(sequence.fps).removesuffix('.0')}", f"seqLength={length}"]
     if sequence.image_size is not None:
-        suffix = ".png" if images == "png" else ".jpg"
-        lines += ["imWidth={}".format(*sequence.image_size), "imHeight={1}".format(*sequence.image_size)]
-        lines.append(f"imExt={suffix}")
+        width, height = sequence.image_size
+        lines += [f"imWidth={width}", f"imHeight={height}", f"imExt={'.png' if images == 'png' else '.jpg'}"]
     return "\n".join([*lines, ""]).encode()
 
 
@@ -145,12 +140,10 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
         raise error
     about, has, pictures = manifest["sequence"], manifest["files"].keys(), StoredPictures(folder, manifest)
     size, length = about["image_size"], about["length"]
-    load_background, words = _background(pictures, background, length)
+    load_background, words = pictures.background(background)
 
     def require_length(name: str, found: int) -> None:
-        if found != length:
-            expected = f"{length} frames, as manifest.json says"
-            raise InputError(file=folder / name, got=f"{found} frames", expected=expected, remedy=REDO)
+        reject(found != length, folder / name, f"{found} frames", f"{length} frames, as manifest.json says", REDO)
 
     @lru_cache(maxsize=1)
     def detections() -> list[Detections]:
@@ -182,21 +175,6 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
         load_pixels=pictures.pixel_loader() if {"ids"} <= set(pictures.streams) else None,
         load_light=lambda: _light(folder, manifest),
     )  # fmt: skip
-
-
-def _background(
-    pictures: StoredPictures, choice: BackgroundChoice | None, length: int
-) -> tuple[Callable[[], Image] | None, dict[str, str]]:
-    """Returns (loader of background pictures, entry for `Sequence.source`); (None, {}) if there are none."""
-    if choice is not None:
-        if "left" not in pictures.streams:
-            got, remedy = "--background", "leave it out: it has none"
-            raise InputError(file=pictures.folder, got=got, expected="none for one without pictures", remedy=remedy)
-        fits = choice.of(length, pictures.folder, pictures.size)
-        return BackgroundSample(fits, length, pictures.folder, pictures.sample), {"background": str(fits)}
-    if "background" not in pictures.streams:
-        return None, {}
-    return (lambda: np.stack(list(pictures.all("background", BACKGROUNDS)))), {"background": OWN_BACKGROUND}
 
 
 def _light(folder: Path, manifest: dict[str, Any]) -> Array:

@@ -11,14 +11,16 @@ import json
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, fields, is_dataclass
+from functools import cache
+from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Literal, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import BaseModel, Field, ValidationError
+from pydantic import BaseModel, Field, ValidationError, create_model
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import COORDINATE, FRAME_RATES, FRAMES, INTEGER, JSON_BYTES, SCALES
 from scenarios.reading import parse_json, require_regular
 from sim.types import Array, Ints
@@ -32,6 +34,7 @@ Scale = Annotated[float, Field(strict=True, ge=SCALES[0], le=SCALES[1])]  # px p
 FrameNumber = Annotated[int, Field(strict=True, ge=1, le=FRAMES)]
 Count = Annotated[int, Field(strict=True, ge=0, le=FRAMES)]  # of frames
 Id = Annotated[int, Field(strict=True, ge=0, le=INTEGER)]
+PLANES = Literal["ground", "space", "image"]
 Pair = tuple[Number, Number]
 Triple = tuple[Number, Number, Number]
 
@@ -49,6 +52,13 @@ def validated(path: Path, value: Any, kind: type[M], remedy: str, place: str = "
     raise InputError(file=path, place=(place + steps).removeprefix("."), got=got, expected=expected, remedy=remedy)
 
 
+@cache
+def model(**kinds: Any) -> type[BaseModel]:
+    """Returns the model of values by key. kinds: of each its type, or its type and what stands for a missing one."""
+    values: Any = {name: kind if isinstance(kind, tuple) else (kind, ...) for name, kind in kinds.items()}
+    return create_model("Values", **values)
+
+
 FORMAT = 1
 KEY = b"flockscope"
 REDO = "run the command that made it again"
@@ -56,9 +66,8 @@ REDO = "run the command that made it again"
 
 # names of columns of several tables
 AXES = ("x", "y", "z")
-BOX, VISIBLE, MODAL = (
-    tuple(f"{kind}_{side}" for side in ("left", "top", "width", "height")) for kind in ("box", "visible", "modal")
-)
+SIDES = ("left", "top", "width", "height")
+BOX, VISIBLE, MODAL = (tuple(f"{kind}_{side}" for side in SIDES) for kind in ("box", "visible", "modal"))
 EXTENT = ("extent_xx", "extent_xy", "extent_yx", "extent_yy")
 # values by the name of a column: an array (R,), or lists as a pyarrow.Array; by a tuple of n names: an array (R, n); a
 # column that is None is left out
@@ -108,27 +117,25 @@ class StoredTable:
         return [np.asarray(v, kind) for v in column]
 
     def _numbers(self, name: str, kinds: str, expected: str) -> NDArray[Any]:
-        if name not in self.columns:
-            raise InputError(file=self.file, got=f"no column {name}", expected="that column", remedy=REDO)
+        reject(name not in self.columns, self.file, f"no column {name}", "that column", REDO)
         column = self.columns[name]
         self.reject(column.dtype.kind not in kinds, name, f"a column of {column.dtype}", expected)
         return column
 
-    def facts_as(self, kind: type[M]) -> M:
-        """Returns the table's metadata as the model `kind`; raises InputError for wrong values."""
-        return validated(self.file, self.facts, kind, REDO, "schema")
+    def facts_as(self, **kinds: Any) -> Any:
+        """Returns the table's metadata as attributes; raises InputError for wrong values. kinds: as of `model`."""
+        return validated(self.file, self.facts, model(**kinds), REDO, "schema")
 
-    def cuts(self, first: int, count: int) -> Ints:
-        """Returns the index of the first row of each of `count` frames from `first` on, then R, (count + 1,)."""
+    def cuts(self, first: int, count: int) -> list[slice]:
+        """Returns the rows of each of `count` frames from `first` on."""
         frame = self.ints("frame")
         wrong = bool(len(frame)) and (frame.min() < first or frame.max() >= first + count or (np.diff(frame) < 0).any())
         self.reject(bool(wrong), "frame", "other frames", f"frames {first} to {first + count - 1}, in order")
-        return np.searchsorted(frame, np.arange(first, first + count + 1))
+        return [slice(*cut) for cut in pairwise(np.searchsorted(frame, np.arange(first, first + count + 1)).tolist())]
 
     def reject(self, wrong: bool, place: str, got: str, expected: str) -> None:
         """Raises InputError about a place in this file if `wrong` is True."""
-        if wrong:
-            raise InputError(file=self.file, place=place, got=got, expected=expected, remedy=REDO)
+        reject(wrong, self.file, got, expected, REDO, place)
 
 
 def table_bytes(columns: Columns, facts: dict[str, Any], units: Mapping[str, str]) -> bytes:
@@ -235,18 +242,26 @@ def read_json(path: Path, remedy: str = REDO) -> dict[str, Any]:
     from sim.store.numeric_text import read_text
 
     value = parse_json(read_text(path, JSON_BYTES), path, remedy)
-    if not isinstance(value, dict):
-        raise InputError(file=path, got=type(value).__name__, expected="a JSON object", remedy=remedy)
-    return value
+    reject(not isinstance(value, dict), path, type(value).__name__, "a JSON object", remedy)
+    found: dict[str, Any] = value
+    return found
 
 
 def read_document(path: Path, remedy: str = REDO) -> dict[str, Any]:
     """Returns the JSON object in a file of ours; InputError for another "format" than 1, which may be missing."""
     value = read_json(path, remedy)
     found = value.get("format", FORMAT)
-    if found != FORMAT or isinstance(found, bool):
-        raise InputError(file=path, place="format", got=repr(found), expected=FORMAT, remedy="use the same version")
+    other = found != FORMAT or isinstance(found, bool)
+    reject(other, path, repr(found), FORMAT, "use the same version", "format")
     return value
+
+
+def read_values(path: Path, remedy: str, no_json: str = REDO, /, **kinds: Any) -> Any:
+    """Returns the values of a JSON file of ours as attributes; raises InputError for wrong ones. kinds: as of `model`.
+
+    remedy: for a wrong value. no_json: for a file that is no JSON object.
+    """
+    return validated(path, read_document(path, no_json), model(**kinds), remedy)
 
 
 def none_to_nan(value: float | None) -> float:

@@ -11,20 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel
 
-from scenarios.errors import InputError
-from sim.arrays import repeated_ids
+from scenarios.errors import InputError, reject
+from sim.arrays import joined, repeated_ids
 from sim.scene.body import PERSON_HEIGHT
 from sim.store import group_files, tables
 from sim.store.atomic import lock_folder, replace_sealed
 from sim.store.seal import EXACT, NAMES, PAIRS, RUN, reject_foreign, sealed_run
-from sim.store.tables import AXES, BOX, Count, Rate, along, table_bytes, units_of
+from sim.store.tables import AXES, BOX, PLANES, Count, Rate, along, table_bytes, units_of
 from sim.store.truth_files import mot_text, score_and_place, scores_or_ones, with_ground_height
 from sim.types import Array, Camera, GroupEvent, Groups, Ints, Scene, Tracks
 
@@ -84,10 +82,6 @@ def flatten(every: list[Tracks]) -> RunRows:
     plane, unit = next(iter(kinds), ("ground", "person"))
     d = 3 if plane == "space" else 2
     counts = [len(t.id) for t in every]
-
-    def joined(values: Iterable[Any], *shape: int, kind: type = np.float64) -> Any:
-        return np.concatenate([np.zeros((0, *shape), kind), *values])
-
     return RunRows(
         plane, unit, np.repeat(np.array([t.index for t in every], np.int64), counts),
         joined((t.id for t in every), kind=np.int64), joined((t.group for t in every), kind=np.int64),
@@ -129,20 +123,13 @@ def pair_table(frame: Ints, a: Ints, b: Ints, probability: Array) -> bytes:
     return table_bytes({"frame": frame, "a": a, "b": b, "probability": probability}, {}, {})
 
 
-class _TrackFacts(BaseModel):
-    plane: Literal["ground", "space", "image"]
-    unit: Literal["person", "group"]
-    fps: Rate
-    first: Count
-    frames: Count
-    boxless: set[int]
-    derived: bool = False
-
-
 def read_track_table(folder: Path) -> list[Tracks]:
     """Returns the tracks of tracks.parquet in `folder`, one Tracks per frame, with groups but without events."""
     table = tables.read_table(folder / EXACT)
-    f = table.facts_as(_TrackFacts)
+    f = table.facts_as(
+        plane=PLANES, unit=Literal["person", "group"], fps=Rate, first=Count, frames=Count, boxless=set[int],
+        derived=(bool, False),
+    )  # fmt: skip
     state, cov = _columns(f.plane)
     d, values, frame = len(state) // 2, table.floats(*state), table.ints("frame")
     rows = RunRows(
@@ -152,8 +139,8 @@ def read_track_table(folder: Path) -> list[Tracks]:
     )  # fmt: skip
     rows.reject_faults(table.file, tables.REDO)
     groups, found = _groups(folder / "groups.parquet", f.first, f.frames), []
-    for index, (a, b) in enumerate(pairwise(table.cuts(f.first, f.frames).tolist()), f.first):
-        r, box = slice(a, b), None if index in f.boxless else rows.box[a:b]
+    for index, r in enumerate(table.cuts(f.first, f.frames), f.first):
+        box = None if index in f.boxless else rows.box[r]
         made = Tracks(
             index, (index - 1) / f.fps, f.plane, f.unit, rows.id[r], rows.group[r], rows.pos[r], rows.vel[r],
             rows.cov[r], box, rows.score[r], groups[index - f.first], derived=f.derived, seen=rows.seen[r],
@@ -279,8 +266,7 @@ def with_events(found: list[Tracks], folder: Path) -> list[Tracks]:
     by_frame: dict[int, list[GroupEvent]] = {}
     for k, (event, frame) in enumerate(group_files.read_events(path)):
         at = next(index for index in (frame, event.emitted, event.end) if index is not None)
-        if not first <= at <= last:
-            got, expected = f"an event reported in frame {at}", f"a frame from {first} to {last}, as the tracks have"
-            raise InputError(file=path, place=f"events[{k}]", got=got, expected=expected, remedy="correct the event")
+        got, expected = f"an event reported in frame {at}", f"a frame from {first} to {last}, as the tracks have"
+        reject(not first <= at <= last, path, got, expected, "correct the event", f"events[{k}]")
         by_frame.setdefault(at, []).append(event)
     return [t.replace(events=tuple(by_frame[t.index])) if t.index in by_frame else t for t in found]

@@ -8,31 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator
-from itertools import pairwise
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
-from pydantic import BaseModel
 
 from scenarios.errors import InputError
 from scenarios.reading import is_present
+from sim.arrays import joined
 from sim.scene.terrain import height_at
 from sim.store import group_files, tables
 from sim.store.seal import REDO
-from sim.store.tables import (
-    AXES,
-    BOX,
-    VISIBLE,
-    Columns,
-    Count,
-    FrameNumber,
-    Rate,
-    Scale,
-    StoredTable,
-    along,
-    read_table,
-)
+from sim.store.tables import AXES, BOX, PLANES, VISIBLE, Count, FrameNumber, Rate, Scale, StoredTable, along, read_table
 from sim.types import Array, Bools, Detections, Groups, Ints, Order, Scene, Truth
 
 
@@ -43,10 +30,9 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
         seen = has_box(truth.box)
         visibility = [f"1,1,{v:.3f}" for v in truth.visibility[seen].tolist()]
         files["gt/gt.txt"] = mot_text(truth.frame[seen], truth.id[seen], truth.box[seen], visibility)
-    if truth.groups is not None:
-        files["gt/groups.parquet"] = group_files.groups_bytes(truth.groups, 1, "m")
-    if truth.groups_px is not None:
-        files["gt/groups_px.parquet"] = group_files.groups_bytes(truth.groups_px, 1, "px")
+    for name, groups, unit in (("groups", truth.groups, "m"), ("groups_px", truth.groups_px, "px")):
+        if groups is not None:
+            files[f"gt/{name}.parquet"] = group_files.groups_bytes(groups, 1, unit)
     if truth.groups is not None or truth.groups_px is not None:
         files["gt/groups.csv"] = group_files.groups_csv(truth.groups, truth.groups_px)
     if truth.events is not None:
@@ -59,7 +45,7 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
 
 
 def _table(truth: Truth) -> bytes:
-    columns: Columns = {
+    columns: tables.Columns = {
         "frame": truth.frame, "id": truth.id, "group": truth.group, ("x", "y"): truth.pos, ("vx", "vy"): truth.vel,
         BOX: truth.box, VISIBLE: truth.visible_box, "visibility": truth.visibility, "z": truth.z,
         "heading": truth.heading, "height": truth.height, "truncation": truth.truncation,
@@ -108,32 +94,23 @@ def mot_text(frame: Ints, id: Ints, box: Array, rest: Iterable[str]) -> bytes:
 def score_and_place(score: Array, place: Array | None) -> Iterator[str]:
     """Yields the cells conf, x, y, z of R MOT lines. place (R, 3): positions in m, nan or None if unknown."""
     places = np.full((len(score), 3), np.nan) if place is None else place
-    return (f"{s:.4f},{_cells(xyz.tolist())}" for s, xyz in zip(score, places, strict=True))
-
-
-def _cells(xyz: list[float]) -> str:
-    if not all(map(math.isfinite, xyz)):
-        return "-1,-1,-1"
-    x, y, z = (f"{v:.3f}" for v in xyz)
-    return f"{x},{y},{z if z != '-1.000' else '-1.001'}"  # z = -1 would mean unknown
-
-
-class _TruthFacts(BaseModel):
-    name: str
-    fps: Rate
-    length: Count
-    px_per_m: Scale | None
-    labelled: list[tuple[FrameNumber, FrameNumber]] | None
+    for s, xyz in zip(score, map(np.ndarray.tolist, places), strict=True):
+        x, y, z = (f"{v:.3f}" for v in xyz) if all(map(math.isfinite, xyz)) else ("-1", "-1", "-1")
+        yield f"{s:.4f},{x},{y},{z if z != '-1.000' else '-1.001'}"  # z = -1 would mean unknown
 
 
 def read_truth(folder: Path) -> Truth:
     """Returns the truth in a sequence folder; fields that are not stored are None."""
     gt = folder / "gt"
     table = read_table(gt / "truth.parquet")
-    facts = table.facts_as(_TruthFacts)
+    labelled = list[tuple[FrameNumber, FrameNumber]] | None
+    facts = table.facts_as(name=str, fps=Rate, length=Count, px_per_m=Scale | None, labelled=labelled)
     length = facts.length
     frame, id = table.ints("frame"), table.ints("id")
-    _check_rows(table, length)
+    table.cuts(1, length)
+    twice = (np.diff(frame) == 0) & (np.diff(id) <= 0)
+    place = f"row {int(np.argmax(twice)) + 1}" if len(twice) else ""
+    table.reject(bool(twice.any()), place, "rows out of order, or twice", "rows sorted by (frame, id)")
     events = group_files.read_events(gt / "events.json") if is_present(gt / "events.json") else None
     return Truth(
         name=facts.name, fps=facts.fps, length=length, px_per_m=tables.none_to_nan(facts.px_per_m),
@@ -147,13 +124,6 @@ def read_truth(folder: Path) -> Truth:
         near=group_files.read_near(gt / "near.csv") if is_present(gt / "near.csv") else None,
         orders=group_files.read_script(gt / "script.json"),
     )  # fmt: skip
-
-
-def _check_rows(table: StoredTable, length: int) -> None:
-    table.cuts(1, length)
-    twice = (np.diff(table.ints("frame")) == 0) & (np.diff(table.ints("id")) <= 0)
-    place = f"row {int(np.argmax(twice)) + 1}" if len(twice) else ""
-    table.reject(bool(twice.any()), place, "rows out of order, or twice", "rows sorted by (frame, id)")
 
 
 def _groups(path: Path) -> tuple[Groups, ...] | None:
@@ -172,12 +142,12 @@ def detection_files(detections: list[Detections], fps: float, scene: Scene | Non
     assert len(forms) <= 1, f"detections of one sequence differ in kind: {sorted(forms)}"
     plane, boxed, moving = next(iter(forms), ("image", True, False))
     axes = AXES[: detections[0].pos.shape[1]] if detections else AXES[:2]
-    pos = np.concatenate([np.zeros((0, len(axes))), *(d.pos for d in detections)])
-    score = np.concatenate([np.zeros(0), *(scores_or_ones(d.score, len(d.pos)) for d in detections)])
+    pos = joined((d.pos for d in detections), len(axes))
+    score = joined(scores_or_ones(d.score, len(d.pos)) for d in detections)
     frame = np.repeat(np.arange(1, len(detections) + 1, dtype=np.int64), [len(d.pos) for d in detections])
     vel = np.concatenate([d.vel for d in detections if d.vel is not None]) if moving else None
     box = np.concatenate([d.box for d in detections if d.box is not None]) if boxed else None
-    columns: Columns = {"frame": frame, axes: pos, "score": score, along(axes): vel, BOX: box}
+    columns: tables.Columns = {"frame": frame, axes: pos, "score": score, along(axes): vel, BOX: box}
     facts = {"plane": plane, "frames": len(detections), "fps": fps}
     rest = score_and_place(score, None if plane == "image" else with_ground_height(pos, scene))
     # An alarm at the picture's edge may be a box without width.
@@ -200,21 +170,16 @@ def with_ground_height(pos: Array, scene: Scene | None) -> Array:
     return np.concatenate([pos, z[:, None]], axis=1)
 
 
-class _DetectionFacts(BaseModel):
-    plane: Literal["ground", "space", "image"]
-    frames: Count
-    fps: Rate
-
-
 def read_detections(path: Path) -> list[Detections]:
     """Returns the detections in a det.parquet, one Detections for each frame from 1."""
     table = read_table(path)
     axes = AXES if "z" in table.columns else AXES[:2]
-    pos, score, facts = table.floats(*axes), table.floats("score"), table.facts_as(_DetectionFacts)
+    pos, score = table.floats(*axes), table.floats("score")
+    facts = table.facts_as(plane=PLANES, frames=Count, fps=Rate)
     vel, box = table.known(*along(axes)), table.known(*BOX)
     found = []
-    for k, (a, b) in enumerate(pairwise(table.cuts(1, facts.frames).tolist())):
-        cut = (pos[a:b], None if vel is None else vel[a:b], None if box is None else box[a:b], score[a:b])
+    for k, r in enumerate(table.cuts(1, facts.frames)):
+        cut = (pos[r], None if vel is None else vel[r], None if box is None else box[r], score[r])
         found.append(Detections(k + 1, k / facts.fps, facts.plane, *cut))
     return found
 

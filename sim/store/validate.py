@@ -67,7 +67,7 @@ def _faults(folder: Path) -> Iterator[FlockscopeError]:
         if seal.is_sequence(folder):
             manifest = seal.read_manifest(folder)
             damaged = list(seal.damaged_files(folder, manifest["files"]))
-            yield from damaged or [*_extra(folder, manifest), *_lost(folder)]
+            yield from damaged or _other_faults(folder, manifest)
             return
         problems = list(run_problems(folder, read_run(folder)))
         yield from problems
@@ -77,14 +77,12 @@ def _faults(folder: Path) -> Iterator[FlockscopeError]:
         yield error
 
 
-def _lost(folder: Path) -> Iterator[InputError]:
-    for one in read_never_arrives(folder):
-        yield _problem(folder, one.words, "groups that reach their goals", "open the way, or move the goal")
-
-
-def _extra(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
+def _other_faults(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
+    lost = read_never_arrives(folder)
     named = {seal.MANIFEST, *manifest["files"]}
     for path in sorted(folder.rglob("*")):
         inside = path.relative_to(folder)
         if path.is_file() and inside.as_posix() not in named and not is_side_file(inside):
             yield _problem(path, "a file the manifest does not name", "only its own", remedy="move it elsewhere")
+    for one in lost:
+        yield _problem(folder, one.words, "groups that reach their goals", "open the way, or move the goal")

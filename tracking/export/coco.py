@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from sim import hashing
 from sim.dataset.splits import split_of
 from sim.scene.visibility import image_size_of_boxes
@@ -54,9 +54,7 @@ def coco(source: str | Path, out: str | Path, *, person_class: int | str | None 
     reject_sealed(out.parent)
     every = open_source(source, person_class=person_class)
     sequences = [s for s in every if s.truth is not None and s.truth.box is not None]
-    if not sequences:
-        expected, remedy = "a dataset with boxes", "give a generated dataset"
-        raise InputError(file=source, got="no labelled boxes", expected=expected, remedy=remedy)
+    reject(not sequences, source, "no labelled boxes", "a dataset with boxes", "give a generated dataset")
     made = [s.source for s in sequences if s.source.get("kind") == "generated"]
     splits = sorted({split_of(range(facts["seed"], facts["seed"] + 1)) for facts in made})
     if len(splits) > 1:
@@ -116,7 +114,8 @@ def _annotations(
     ids = None if sequence.load_pixels is None else np.asfortranarray(sequence.load_pixels(index).ids)
     for row in range(*truth.rows(index).indices(len(boxes))):
         box = [round(v, 2) for v in boxes[row].tolist()]
-        left, top, right, bottom = _inside(boxes[row], size)
+        corners = np.clip([boxes[row, :2], boxes[row, :2] + boxes[row, 2:]], 0, size)
+        left, top, right, bottom = np.round(corners.ravel(), 2).tolist()
         if not (right > left and bottom > top):  # also for nan
             continue
         person, area = int(truth.id[row]), round(box[2] * box[3], 2)
@@ -128,11 +127,6 @@ def _annotations(
             "bbox": box, "segmentation": segmentation, "area": area, "iscrowd": 0, "track_id": person,
             "group_id": int(truth.group[row]), "visibility": round(float(truth.visibility[row]), 3),
         }  # fmt: skip
-
-
-def _inside(box: Array, size: tuple[int, ...]) -> tuple[float, ...]:
-    low, high = np.clip(box[:2], 0, size), np.clip(box[:2] + box[2:], 0, size)
-    return tuple(np.round([*low, *high], 2).tolist())
 
 
 def run_lengths(mask: Bools) -> list[int]:

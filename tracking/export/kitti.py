@@ -17,7 +17,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import reject
 from sim.pictures.stored_pictures import StoredPictures
 from sim.store.atomic import write_file
 from sim.store.camera_files import read_camera
@@ -44,8 +44,7 @@ def kitti(source: str | Path, out: str | Path) -> list[Path]:
     """
     folders = generated_folders(Path(source))
     targets = [Path(out) / split_and_name(folder) for folder in folders]
-    if len(set(targets)) < len(targets):
-        raise InputError(file=source, got="two sequences of one name", expected="unique names", remedy="rename one")
+    reject(len(set(targets)) < len(targets), source, "two sequences of one name", "unique names", "rename one")
     for folder, target in zip(folders, targets, strict=True):
         reject_sealed(target)
         _export(folder, target)
@@ -68,9 +67,8 @@ def calibration(camera: Camera) -> str:
 def _export(folder: Path, target: Path) -> None:
     stored = StoredPictures(folder, read_whole_manifest(folder))
     missing = [name for name in ("left", "right") if name not in stored.streams]
-    if missing:
-        remedy = "generate it with --streams left,right,disparity"
-        raise InputError(file=folder, got=f"no stream {' or '.join(missing)}", expected="left and right", remedy=remedy)
+    remedy = "generate it with --streams left,right,disparity"
+    reject(missing, folder, f"no stream {' or '.join(missing)}", "left and right", remedy)
     write_file(target / "calib.txt", calibration(read_camera(folder / "camera.json")).encode())
     about = stored.manifest["sequence"]
     times = "".join(f"{k / about['fps']:.6e}\n" for k in range(about["length"]))

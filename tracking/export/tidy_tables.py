@@ -29,9 +29,9 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import reject
 from scenarios.limits import COORDINATE
-from sim.arrays import no_ids
+from sim.arrays import joined, no_ids
 from sim.geometry.polygons import cross
 from sim.store.atomic import write_file
 from sim.store.numeric_text import number_or_nan
@@ -178,9 +178,8 @@ def write_tables(tables: TidyTables, folder: Path, form: Form, facts: Mapping[st
     """
     if form in TEXTS:
         name, beginning = TEXTS[form]
-        if "x_m" not in tables.people.columns:
-            got, expected = "people in the image, px", "positions on the ground, m"
-            raise InputError(file=folder, got=got, expected=expected, remedy="track with --camera, or from points")
+        got, expected = "people in the image, px", "positions on the ground, m"
+        reject("x_m" not in tables.people.columns, folder, got, expected, "track with --camera, or from points")
         body = (trajnet_text if form == "trajnet" else pedpy_text)(tables, facts["fps"])
         _refuse_foreign(folder / name, beginning)
         write_file(folder / name, body.encode())
@@ -261,16 +260,11 @@ def _group_rows(rows: _Rows) -> tuple[Ints, Ints, Array, tuple[Ints, Ints, Ints]
     """Returns frame, id and size of each group in each frame (G,), and (frame, group, id) of each member (M,)."""
     every = list(zip(rows.listed.tolist(), rows.groups or (), strict=False))
     frame = np.repeat(np.array([k for k, _ in every], np.int64), [len(g.id) for _, g in every])
-    group = _joined([g.id for _, g in every], np.int64)
-    size = _joined([g.size for _, g in every], np.float64)
+    group, size = joined((g.id for _, g in every), kind=np.int64), joined(g.size for _, g in every)
     listed = [(k, name, m) for k, g in every for name, m in zip(g.id.tolist(), g.members, strict=False)]
     counts = [len(m) for *_, m in listed]
     when, name = (np.repeat(np.array([item[k] for item in listed], np.int64), counts) for k in (0, 1))
-    return frame, group, size, (when, name, _joined([m for *_, m in listed], np.int64))
-
-
-def _joined(parts: list[Any], kind: type) -> Any:
-    return np.concatenate([np.zeros(0, kind), *parts]).astype(kind)
+    return frame, group, size, (when, name, joined((m for *_, m in listed), kind=np.int64))
 
 
 def _span(rows: _Rows, first: Ints, last: Ints) -> dict[str, Any]:
@@ -370,9 +364,7 @@ def _counts(rows: _Rows, number: Ints, group: Ints) -> dict[str, Any]:
     for name, corners in rows.places.items():
         ends = known.min(axis=0, initial=np.inf), known.max(axis=0, initial=-np.inf)
         if len(known) and ((corners.max(axis=0) < ends[0]) | (corners.min(axis=0) > ends[1])).any():
-            area = " and ".join(
-                f"{axis} from {low:.4g} to {high:.4g}" for axis, low, high in zip("xy", *ends, strict=True)
-            )
+            area = " and ".join(f"{k} from {low:.4g} to {high:.4g}" for k, low, high in zip("xy", *ends, strict=True))
             warnings.warn(f"{name} lies outside all positions, which have {area} {rows.unit}", stacklevel=2)
         if len(corners) == LINE:
             left, right = crossings(rows.frame, rows.id, rows.pos, corners, downwards=rows.unit == "px")
@@ -402,16 +394,13 @@ def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
         name, _, cells = text.partition("=")
         values = list(map(number_or_nan, cells.split(",")))
         count = len(values) == 4 if option == "--line" else len(values) >= 6 and len(values) % 2 == 0
-        got, expected = repr(text), f"{forms[option]}, each name once, of letters, digits and _"
+        form = f"{forms[option]}, each name once, of letters, digits and _"
         remedy = "write --line door=2,5,4,5 or --zone hall=0,0,9,0,9,6; in px for tracks in the image"
-        if name.isidentifier() and name not in found and count and np.max(np.abs(values)) <= COORDINATE:
-            found[name] = np.reshape(values, (-1, 2))
-            fault = _fault(found[name])
-            if not fault:
-                continue
-            got = f"{text!r}, {fault}"
-            expected = "two ends apart" if option == "--line" else "corners in order round it"
-        raise InputError(place=option, got=got, expected=expected, remedy=remedy)
+        right = name.isidentifier() and name not in found and count and np.max(np.abs(values)) <= COORDINATE
+        reject(not right, "", repr(text), form, remedy, option)
+        found[name] = np.reshape(values, (-1, 2))
+        fault, expected = _fault(found[name]), "two ends apart" if option == "--line" else "corners in order round it"
+        reject(fault, "", f"{text!r}, {fault}", expected, remedy, option)
     return found
 
 

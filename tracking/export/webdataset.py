@@ -16,7 +16,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from sim import hashing
 from sim.pictures.stored_pictures import StoredPictures
 from sim.store import tables
@@ -84,9 +84,7 @@ def size_of(text: str) -> int:
     """Returns the number of bytes that a text such as `500MB`, `1.5 GB` or `3 kB` means; units are powers of 1000."""
     found = re.fullmatch(r"([0-9]{1,12}(?:\.[0-9]{1,6})?)\s*(?:([kMG])?B)?", text.strip())
     size = 0 if found is None else round(float(found[1]) * UNITS[found[2] or ""])
-    if size < 1:
-        expected = "bytes, kB, MB or GB above 0"
-        raise InputError(place="--shard-size", got=repr(text), expected=expected, remedy="write 500MB")
+    reject(size < 1, "", repr(text), "bytes, kB, MB or GB above 0", "write 500MB", "--shard-size")
     return size
 
 
@@ -94,8 +92,7 @@ def _shards(source: Path, size: int) -> list[dict[Path, str]]:
     """Returns the content hash of each sequence folder of each shard, as many as fit into a tar of `size` bytes."""
     folders = sorted(generated_folders(source), key=split_and_name)
     twice = next((a for a, b in pairwise(map(split_and_name, folders)) if a == b), None)
-    if twice is not None:
-        raise InputError(file=source, got=f"two sequences {twice}", expected="unique names", remedy="export them apart")
+    reject(twice is not None, source, f"two sequences {twice}", "unique names", "export them apart")
     shards: list[dict[Path, str]] = []
     full = size
     for folder in folders:
@@ -133,4 +130,4 @@ def _members(folder: Path) -> Iterator[tuple[str, bytes]]:
     stored = StoredPictures(folder, read_whole_manifest(folder))
     yield f"{_key(folder)}.{MANIFEST}", (folder / MANIFEST).read_bytes()
     for name in stored.manifest["files"]:
-        yield f"{_key(folder)}.{name.replace('/', '.')}", stored.body(name)
+        yield f"{_key(folder)}.{name.replace('/', '.')}", stored.check(name, whole=True)

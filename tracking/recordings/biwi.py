@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import FRAME_RATES
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
@@ -104,8 +104,7 @@ def _table(folder: Path) -> tuple[NumericTable, Ints, Ints]:
     """Returns (rows of obsmat.txt, our frames (R,), person ids (R,)), sorted by (frame, id)."""
     path = folder / "obsmat.txt"
     rows = read_rows(path).numbers((8,), layout="frame id x z y vx vz vy")
-    if not len(rows.line):
-        raise InputError(file=path, got="no line", expected="people: frame id x z y vx vz vy", remedy="restore it")
+    reject(not len(rows.line), path, "no line", "people: frame id x z y vx vz vy", "restore it")
     raw, id = rows.integers(0, "frame"), rows.integers(1, "id")
     rows.reject(id < 0, "ids from 0", "correct the id")
     frame = frame_numbers(raw, id)

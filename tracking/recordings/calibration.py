@@ -23,7 +23,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import COORDINATE, JSON_BYTES, XML_BYTES, YAML_BYTES
 from scenarios.reading import parse_json, read_regular, require_regular
 from sim.scene.camera import require_camera
@@ -35,6 +35,7 @@ MM = 1000.0  # per m
 YAML = (".yml", ".yaml")
 OWN = ("kind", "image", "focal_px", "centre_px")  # keys of camera.json
 FORMS = f"Tsai's XML, OpenCV's K or P1 and P2, or a camera.json with {', '.join(OWN)}, rotation, position"
+AS_OWN, CORRECT = "write its numbers as a camera.json", "correct the calibration"
 PARTS = {
     "Geometry": ("width", "height", "dpx", "dpy"),
     "Intrinsic": ("focal", "kappa1", "cx", "cy", "sx"),
@@ -59,18 +60,13 @@ def read_tsai(path: Path) -> Camera:
 
 def _values(path: Path) -> dict[str, float]:
     root = xml_root(path, "Tsai's calibration as XML, or a camera.json", "check --camera")
-    if all(root.find(part) is None for part in PARTS):
-        raise _wrong(path, "", f"<{root.tag}>", FORMS, "write its numbers as a camera.json")
+    reject(all(root.find(part) is None for part in PARTS), path, f"<{root.tag}>", FORMS, AS_OWN)
     found = {}
     for part, name in ((part, name) for part, names in PARTS.items() for name in names):
         element = root.find(part)
         text, low = None if element is None else element.get(name), SMALLEST if name in POSITIVE else -LARGEST
         found[name] = bounded_number(path, f"{part} {name}", text, low, LARGEST)
     return found
-
-
-def _wrong(path: Path, place: str, got: str, expected: str, remedy: str = "correct the calibration") -> InputError:
-    return InputError(file=path, place=place, got=got, expected=expected, remedy=remedy)
 
 
 def _rotation(rx: float, ry: float, rz: float) -> Array:
@@ -98,27 +94,25 @@ def read_opencv(path: Path) -> Camera:
     one = "K" in found and "P1" not in found and "P2" not in found
     wanted = ["image_width", "image_height", *(["K"] if one else ["P1", "P2"]), "rotation", "position"]
     missing = [key for key in wanted if key not in found]
-    if missing:
-        remedy = "add them (rotation: 3 × 3, world to camera; position: of the camera, m, z up), or give a camera.json"
-        raise _wrong(path, ", ".join(missing), "nothing", f"the keys {', '.join(wanted)}", remedy)
+    remedy = "add them (rotation: 3 × 3, world to camera; position: of the camera, m, z up), or give a camera.json"
+    reject(missing, path, "nothing", f"the keys {', '.join(wanted)}", remedy, ", ".join(missing))
     for key in wanted:
         size = math.prod(KEYS[key][0])
-        if found[key].size != size or not (np.abs(found[key]) <= COORDINATE).all():
-            raise _wrong(path, key, f"{found[key].size} numbers", f"{size} within {COORDINATE:g}")
-    if one and found["D"].any():
-        remedy = "undistort the pictures (cv2.undistort), and give zeros"
-        raise _wrong(path, "D", "distortion", "a camera without, or the Tsai XML", remedy)
+        wrong = found[key].size != size or not (np.abs(found[key]) <= COORDINATE).all()
+        reject(wrong, path, f"{found[key].size} numbers", f"{size} within {COORDINATE:g}", CORRECT, key)
+    remedy = "undistort the pictures (cv2.undistort), and give zeros"
+    reject(one and found["D"].any(), path, "distortion", "a camera without, or the Tsai XML", remedy, "D")
     value = {key: found[key].reshape(KEYS[key][0]) for key in wanted}
     left = value["K" if one else "P1"]
     right = left if one else value["P2"]
-    if np.abs(left[STRAY]).max() > SAME * abs(left[0, 0]) or left[2, 2] != 1:
-        remedy = "transpose it, if it is MATLAB's; skew is not supported"
-        raise _wrong(path, "K" if one else "P1", f"{left.tolist()}", "fx, 0, cx; 0, fy, cy; 0, 0, 1", remedy)
+    wrong = np.abs(left[STRAY]).max() > SAME * abs(left[0, 0]) or left[2, 2] != 1
+    remedy = "transpose it, if it is MATLAB's; skew is not supported"
+    reject(wrong, path, left.tolist(), "fx, 0, cx; 0, fy, cy; 0, 0, 1", remedy, "K" if one else "P1")
     fx, fy = float(left[0, 0]), float(left[1, 1])
     apart = np.abs(left - right)
     apart[0, -1] = 0
-    if not (fx > 0 and apart.max() <= SAME * fx and (one or right[0, 3] < 0)):
-        raise _wrong(path, "P2", "another pair", "P1 and P2 equal but for P2[0, 3] < 0", "rectify the pair")
+    pair = fx > 0 and apart.max() <= SAME * fx and (one or right[0, 3] < 0)
+    reject(not pair, path, "another pair", "P1 and P2 equal but for P2[0, 3] < 0", "rectify the pair", "P2")
     camera = Camera(
         kind="pinhole", image=(int(value["image_width"]), int(value["image_height"])), focal_px=(fx, fy),
         # OpenCV's pixel coordinates begin at the centre of the first pixel, ours at its corner.
@@ -176,13 +170,12 @@ def read_calibration(path: Path) -> Camera:
     height = float(camera.position[2])
     # From so high, a person right below would be smaller than 2 px in any direction of view.
     person = camera.focal_px[1] * PERSON / height if camera.kind == "pinhole" else np.inf
-    if person < SMALLEST_PERSON:
-        got = f"height {height:g} m, from where a person is {person:.2g} px tall"
-        raise _wrong(path, "position", got, "metres", "give all lengths in metres")
+    got = f"height {height:g} m, from where a person is {person:.2g} px tall"
+    reject(person < SMALLEST_PERSON, path, got, "metres", "give all lengths in metres", "position")
     widest = max(WIDEST, height * WIDEST_SHARE)
-    if camera.baseline > widest:
-        remedy = "give T, and P2 made from it, in metres: divide by 1000 if they are in mm"
-        raise _wrong(path, "baseline", f"{camera.baseline:g} m", f"metres, up to {widest:g} m at this height", remedy)
+    got, expected = f"{camera.baseline:g} m", f"metres, up to {widest:g} m at this height"
+    remedy = "give T, and P2 made from it, in metres: divide by 1000 if they are in mm"
+    reject(camera.baseline > widest, path, got, expected, remedy, "baseline")
     return camera
 
 
@@ -197,5 +190,5 @@ def _reader(path: Path) -> Callable[[Path], Camera]:
     if isinstance(document, dict) and not keys.isdisjoint(document):
         return read_opencv
     if isinstance(document, dict) and document.keys().isdisjoint(OWN):
-        raise _wrong(path, "", f"the keys {', '.join(document)}"[:100], FORMS, "write its numbers as a camera.json")
+        raise InputError(file=path, got=f"the keys {', '.join(document)}"[:100], expected=FORMS, remedy=AS_OWN)
     return read_camera

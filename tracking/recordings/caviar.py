@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import COORDINATE, FRAMES
 from sim.arrays import repeated_ids
 from sim.geometry.boxes import centres
@@ -32,16 +32,6 @@ IMAGE_SIZE = (384, 288)
 SMALLEST = 1e-6  # px: least width and height of a box
 
 
-def read_xml(path: Path) -> ET.Element:
-    """Returns the root of the CAVIAR file (CVML) `path`."""
-    root = xml_root(path, "a CAVIAR file (CVML)", "fetch the file again")
-    if root.tag != "dataset" or root.find("frame") is None:
-        remedy = f"give another file; if it holds rows of people, write them as .csv, and {NAME_THEM}"
-        got = "no <frame> in <dataset>" if root.tag == "dataset" else f"<{root.tag}>"
-        raise InputError(file=path, got=got, expected="<dataset> of CAVIAR (CVML)", remedy=remedy)
-    return root
-
-
 def people_of(path: Path, root: ET.Element) -> tuple[MotTable, int]:
     """Returns the people in a CAVIAR file, sorted by (frame, id), and its number of frames.
 
@@ -49,7 +39,7 @@ def people_of(path: Path, root: ET.Element) -> tuple[MotTable, int]:
     """
     rows, length = list[tuple[float, ...]](), 0
     for element in root.iterfind("frame"):
-        index = int(_number(path, "frame", element, "number", 0, FRAMES - 1, whole=True)) + 1
+        index = _whole(path, "frame", element, "number", FRAMES - 1) + 1
         length = max(length, index)
         label = _labels(path, index, element)
         rows += [_row(path, index, person, label) for person in element.iterfind("objectlist/object")]
@@ -61,11 +51,12 @@ def people_of(path: Path, root: ET.Element) -> tuple[MotTable, int]:
     return MotTable(table, frame, id, values[:, 3:], np.zeros((len(rows), 0)), group), length
 
 
-def _number(
-    path: Path, place: str, element: ET.Element, key: str, low: float = -COORDINATE, high: float = COORDINATE,
-    whole: bool = False,
-) -> float:  # fmt: skip
-    return bounded_number(path, f"{place}: {element.tag} {key}", element.get(key), low, high, whole)
+def _number(path: Path, place: str, element: ET.Element, key: str, low: float = -COORDINATE) -> float:
+    return bounded_number(path, f"{place}: {element.tag} {key}", element.get(key), low, COORDINATE)
+
+
+def _whole(path: Path, place: str, element: ET.Element, key: str, last: int = LAST_ID) -> int:
+    return int(bounded_number(path, f"{place}: {element.tag} {key}", element.get(key), 0, last, whole=True))
 
 
 def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
@@ -77,7 +68,7 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
             continue
         if members & label.keys():
             warnings.warn(f"{path}: frame {index - 1}: a person in two groups; the first holds", stacklevel=3)
-        number = int(_number(path, f"frame {index - 1}", group, "id", 0, LAST_ID, whole=True))
+        number = _whole(path, f"frame {index - 1}", group, "id")
         label.update({m: number for m in sorted(members) if m not in label})
     return label
 
@@ -85,7 +76,7 @@ def _labels(path: Path, index: int, element: ET.Element) -> dict[int, int]:
 def _row(path: Path, index: int, person: ET.Element, label: dict[int, int]) -> tuple[float, ...]:
     """Returns (frame, id, label, left, top, width, height), px; label -1 for alone."""
     place, box = f"frame {index - 1}", person.find("box")
-    id = int(_number(path, place, person, "id", 0, LAST_ID, whole=True))
+    id = _whole(path, place, person, "id")
     place += f": object {id}"
     if box is None:
         raise InputError(file=path, place=place, got="an object without box", expected="a box", remedy="add it")
@@ -101,7 +92,10 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     boxes / 1.7 m, that of the sequence the median of the first 100; `source["px_per_m_frames"]` is then the last frame
     of these boxes. `options.camera` is refused for CAVIAR's own recordings.
     """
-    root, px_per_m = read_xml(path), options.px_per_m
+    root, px_per_m = xml_root(path, "a CAVIAR file (CVML)", "fetch the file again"), options.px_per_m
+    remedy = f"give another file; if it holds rows of people, write them as .csv, and {NAME_THEM}"
+    got = "no <frame> in <dataset>" if root.tag == "dataset" else f"<{root.tag}>"
+    reject(root.tag != "dataset" or root.find("frame") is None, path, got, "<dataset> of CAVIAR (CVML)", remedy)
     table, length = people_of(path, root)
     name, sides, centre = root.get("name", path.stem), table.box[:, 2:].max(axis=1), centres(table.box)
     # CAVIAR's own recordings have hypotheses about what people do, and all boxes lie in CAVIAR's pictures.
@@ -110,9 +104,8 @@ def open_file(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     rate = options.fps or FPS
     if own:
         options.reject(path, "a CAVIAR recording", "its boxes do not show where people stand", "camera")
-    if options.fps is None and not own:
-        got, expected = "labels without frame rate, not of CAVIAR's recordings", "the frames per second of the video"
-        raise InputError(file=path, place="--fps", got=got, expected=expected, remedy="give --fps")
+    got = "labels without frame rate, not of CAVIAR's recordings"
+    reject(options.fps is None and not own, path, got, "the frames per second of the video", "give --fps", "--fps")
     if options.fps is None:
         # The text names no path, so that a command over many recordings prints it once.
         words = f"CAVIAR's recordings are taken at {FPS:g} fps, with pictures of {IMAGE_SIZE[0]}×{IMAGE_SIZE[1]} px"

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import is_number
 from scenarios.reading import parse_json
 from sim.store.numeric_text import NumericTable, read_text
@@ -38,14 +38,13 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
     Raises InputError if the file cannot be read, has no boxes, or does not fit the sequence's frames and pictures.
     """
     if path.suffix.lower() == ".json":
-        table = table_of_rows(_coco_results(path), box_scale=options.box_scale)
+        table = table_of_rows(_coco_results(path), box_scale=options.box_scale, boxless=False)
     else:
         frames_at = partial(_frames_at, path, sequence)
-        table = read_table(path, boxless=True, box_scale=options.box_scale, frames_at=frames_at, px_per_m=1.0)
+        table = read_table(path, box_scale=options.box_scale, frames_at=frames_at, px_per_m=1.0)
     mot_text.require_classes(table, options.person_class)
     found = mot_text.detections_of_table(table, options)
-    if not len(found.frame):
-        raise InputError(file=path, got="no box", expected="the boxes of a detector", remedy="check the file")
+    reject(not len(found.frame), path, "no box", "the boxes of a detector", "check the file")
     # Boxes may be numbered like picture files that are counted otherwise.
     origin, step = sequence.source.get("numbering", (1, 1))
     before, rest = np.divmod(found.frame - origin, step)
@@ -54,16 +53,14 @@ def with_boxes(sequence: Sequence, path: Path, options: BoxOptions = NO_OPTIONS.
     if found.plane != "image" or found.box is None:
         raise InputError(file=path, got="points", expected="boxes, px", remedy="give the detector's boxes")
     last = int(found.frame.max())
-    if sequence.length is not None and last > sequence.length:
-        got, expected = f"frame {last}", f"at most {sequence.length}, the frames of {sequence.name}"
-        remedy = "give the boxes of this recording; frames count from 1"
-        raise InputError(file=path, got=got, expected=expected, remedy=remedy)
+    expected = f"at most {sequence.length}, the frames of {sequence.name}"
+    remedy = "give the boxes of this recording; frames count from 1"
+    reject(sequence.length is not None and last > sequence.length, path, f"frame {last}", expected, remedy)
     if sequence.image_size is not None:
         far = np.quantile(found.box[:, :2] + found.box[:, 2:], 0.95, axis=0)
-        if (far > OUTSIDE * np.array(sequence.image_size)).any():
-            got, remedy = "boxes that end at {:.0f}, {:.0f} px".format(*far), "if they are of another size, --box-scale"
-            expected = "boxes in pictures of {} × {} px".format(*sequence.image_size)
-            raise InputError(file=path, got=got, expected=expected, remedy=remedy)
+        got, remedy = "boxes that end at {:.0f}, {:.0f} px".format(*far), "if they are of another size, --box-scale"
+        expected = "boxes in pictures of {} × {} px".format(*sequence.image_size)
+        reject((far > OUTSIDE * np.array(sequence.image_size)).any(), path, got, expected, remedy)
 
     def joined(frames: Callable[[], Iterator[Frame]]) -> Iterator[Frame]:
         for frame in frames():
@@ -89,11 +86,10 @@ def _frames_at(path: Path, sequence: Sequence, seconds: Array, _: Array) -> Ints
     fits = near & (np.abs(seconds - nearest) <= SAME)
     out = f"{(~fits).sum()} of {len(fits)} boxes have times of no frame, or of one that has nearer ones"
     if len(near) and near.mean() < 0.5:
-        raise InputError(
-            file=path, place="times", got=f"{seconds.min():g} to {seconds.max():g} s: {out}",
-            expected=f"times of {len(times)} frames, {times[0]:g} to {times[-1]:g} s",
-            remedy="give seconds since the first frame, and the recording's --fps",
-        )  # fmt: skip
+        got = f"{seconds.min():g} to {seconds.max():g} s: {out}"
+        expected = f"times of {len(times)} frames, {times[0]:g} to {times[-1]:g} s"
+        remedy = "give seconds since the first frame, and the recording's --fps"
+        raise InputError(file=path, place="times", got=got, expected=expected, remedy=remedy)
     if not fits.all():
         warnings.warn(f"{path}: {out}, and are left out", stacklevel=2)
     return np.where(fits, k + 1, 0)
@@ -102,9 +98,8 @@ def _frames_at(path: Path, sequence: Sequence, seconds: Array, _: Array) -> Ints
 def _coco_results(path: Path) -> NumericTable:
     """Returns frame, -1, left, top, width, height, score and category of each result."""
     results = parse_json(read_text(path), path, "check the file")
-    if not isinstance(results, list):
-        remedy = "give the detector's results, with image_id, category_id, bbox and score"
-        raise InputError(file=path, got="no list", expected="a list of COCO results", remedy=remedy)
+    remedy = "give the detector's results, with image_id, category_id, bbox and score"
+    reject(not isinstance(results, list), path, "no list", "a list of COCO results", remedy)
     rows = [_row(path, k, each) for k, each in enumerate(results, 1)]
     values = np.array(rows, np.float64).reshape(-1, 8)
     return NumericTable(path, values, np.arange(1, len(rows) + 1), COLUMNS, unit="result")

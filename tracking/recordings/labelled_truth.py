@@ -29,24 +29,24 @@ RUN = 3.0
 
 def warn_of_places(file: Path, truth: Truth) -> None:
     """Warns if a file's positions and velocities can hardly be on the ground in m and m/s."""
-    if truth.pos is None or truth.vel is None:
-        return
-    known = np.isfinite(truth.pos + truth.vel).all(axis=1)
-    near = _distance_of_neighbours(truth.frame[known], truth.pos[known])
-    if near < NEAR:
-        doubt = f"half are within {near:.2g} m of another: write metres, or name the unit, as x_km,y_km"
-        warnings.warn(f"{file}: positions of people: {doubt}", stacklevel=4)
-        return
-    if len(np.unique(truth.id[known])) < SOME:
-        return
-    span, speed = np.ptp(truth.pos[known], axis=0), np.median(np.hypot(*truth.vel[known].T))
-    doubt = f"their median speed is {speed:.3g} m/s: check their unit, and the frame rate" if speed > RUN else ""
-    if span.max() <= 1:
-        doubt = "all are within 1 m: write metres, if they are shares of a picture or degrees"
-    elif span.min() == 0:
-        doubt = f"all have the same {'xy'[span.argmin()]}: give x and y on the ground, if it is the height"
+    doubt = "" if truth.pos is None or truth.vel is None else _doubt(truth.frame, truth.id, truth.pos, truth.vel)
     if doubt:
         warnings.warn(f"{file}: positions of people: {doubt}", stacklevel=4)
+
+
+def _doubt(frame: Ints, id: Ints, pos: Array, vel: Array) -> str:
+    known = np.isfinite(pos + vel).all(axis=1)
+    near = _distance_of_neighbours(frame[known], pos[known])
+    if near < NEAR:
+        return f"half are within {near:.2g} m of another: write metres, or name the unit, as x_km,y_km"
+    if len(np.unique(id[known])) < SOME:
+        return ""
+    span, speed = np.ptp(pos[known], axis=0), np.median(np.hypot(*vel[known].T))
+    if span.max() <= 1:
+        return "all are within 1 m: write metres, if they are shares of a picture or degrees"
+    if span.min() == 0:
+        return f"all have the same {'xy'[span.argmin()]}: give x and y on the ground, if it is the height"
+    return f"their median speed is {speed:.3g} m/s: check their unit, and the frame rate" if speed > RUN else ""
 
 
 def _distance_of_neighbours(frame: Ints, pos: Array) -> float:
@@ -83,7 +83,8 @@ def labelled_truth_fields(
     intent = np.where(label >= 0, label, label.max(initial=0) + 1 + column)
     meant, rows = (MotionRows.of(frame - 1, column, metres, speed, g, length) for g in (intent, label))
     measured = groups_and_events(meant, fps)
-    names = _names(measured.group[meant.find(column, frame - 1)], label)
+    distinct = zip(*np.unique(measured.group[meant.find(column, frame - 1)], return_index=True), strict=True)
+    names = {int(g): int(label[k]) for g, k in distinct if g >= 0}
     found = [_named(e, names, people, px_per_m) for e in measured.events]
     met = crossings(rows, fps) + queues(rows, fps)
     found += [_named(e, {}, people, px_per_m) for e in met]
@@ -116,11 +117,6 @@ def with_labels(truth: Truth, label: Ints) -> Truth:
     known = labelled_truth_fields(*rows, pos, vel, fps=fps, length=length, px_per_m=truth.px_per_m)
     shapes = box_groups(*rows, pos, vel, truth.box, 1, length)
     return truth.replace(**{**known, "groups": None}, groups_px=tuple(shapes))
-
-
-def _names(measured: Ints, label: Ints) -> dict[int, int]:
-    found, first = np.unique(measured, return_index=True)
-    return {int(g): int(label[k]) for g, k in zip(found, first, strict=True) if g >= 0}
 
 
 def _named(event: GroupEvent, names: dict[int, int], people: Ints, px_per_m: float) -> GroupEvent:

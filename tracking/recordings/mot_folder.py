@@ -12,10 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import FRAME_RATES, FRAMES, PICTURE_SIZES, fits_picture
 from scenarios.limits import PICTURE_SIDE as SIDE
 from scenarios.reading import is_present
+from sim.arrays import joined
 from sim.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.pictures.picture_folder import PictureFolder, fill_gaps, find_pictures, find_right_pictures
 from sim.scene.camera import scaled_to_image
@@ -39,10 +40,10 @@ class SeqInfo:
 
 
 def read_seqinfo(path: Path) -> SeqInfo:
-    """Returns the values in the section [Sequence] of a seqinfo.ini; default values for missing keys."""
+    """Returns the values in the section [Sequence] of a seqinfo.ini; default values for missing keys, or no file."""
     parser = configparser.ConfigParser(interpolation=None)
     try:
-        parser.read_string(read_text(path))
+        parser.read_string(read_text(path) if is_present(path) else "")
     except configparser.Error as error:
         reason = (error.message.splitlines() or ["no ini file"])[0]
         raise InputError(file=path, got=reason, expected="key=value lines", remedy="correct the file") from None
@@ -72,26 +73,23 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     img1_right/ holds the pictures of the right camera of a rectified pair. The length is that of seqinfo.ini, else the
     last frame of texts and pictures. The truth is read, and checked, when asked for.
     """
-    info, images, background = _info(path), options.images, options.background
+    info, images, background = read_seqinfo(path / "seqinfo.ini"), options.images, options.background
     rate = mot_text.frame_rate(options.fps, info.fps)
     gt, det = path / "gt" / "gt.txt", path / "det" / "det.txt"
     found, of_boxes = None, options.box_options
     if is_present(det):
-        table = read_table(
-            det, length=info.length, boxless=True, box_scale=of_boxes.box_scale, px_per_m=options.px_per_m
-        )
+        table = read_table(det, length=info.length, box_scale=of_boxes.box_scale, px_per_m=options.px_per_m)
         if not is_present(gt):  # else --class may be of the labels
             mot_text.require_classes(table, of_boxes.person_class)
         found = mot_text.detections_of_table(table, of_boxes)
     else:
         names = "box_scale min_score" if is_present(gt) else "box_scale min_score person_class"
         options.reject(path, "a recording without det/det.txt", "it has no detections", names)
-    pictures = _find_pictures(path, info)
+    pictures = left_pictures(path)
     right = find_right_pictures(path / f"{info.image_dir}_right", pictures)
     length = info.length or max(_labelled_frames(path).max(initial=0).item(), pictures.last)
-    if not length:
-        expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
-        raise InputError(file=path, got="nothing that tells its length", expected=expected, remedy="complete it")
+    expected = "a row in gt.txt or det.txt, a picture, or seqLength in seqinfo.ini"
+    reject(not length, path, "nothing that tells its length", expected, "complete it")
     beyond = [file.name for frame, file in pictures.files.items() if frame > length]
     if beyond and len(pictures.files) <= length:
         got, expected = f"{beyond[0]} among {len(pictures.files)} pictures", f"frames 1 to {length}"
@@ -105,8 +103,7 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         got, expected = "{} × {}".format(*size or ()), "{} × {}, the size of the pictures".format(*seen)
         ini, remedy = path / "seqinfo.ini", "correct it, or restore the pictures"
         raise InputError(file=ini, place="imWidth, imHeight", got=got, expected=expected, remedy=remedy)
-    doubt = "" if found is None or found.box is None or size is None else size_doubt(found.box, size)
-    if doubt:
+    if found is not None and found.box is not None and size is not None and (doubt := size_doubt(found.box, size)):
         warnings.warn(f"{det}: {doubt}", stacklevel=2)
     if not pictures.files:
         options.reject(path, "a recording without pictures", "it has none", "background")
@@ -117,12 +114,12 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         there = images and pictures.files and folder.files
         return (lambda: fill_gaps(folder.read(every, seen), length, name)) if there else None
 
+    def truth() -> Truth:
+        table = read_table(gt, length=length, px_per_m=options.px_per_m)
+        return mot_text.truth_of_table(table, info.name, rate, length, options.scale, of_boxes.person_class)
+
     def sample(wanted: list[int]) -> Iterator[tuple[int, Image]]:
         return pictures.read(wanted, seen or pictures.first_size())
-
-    def truth() -> Truth:
-        table = read_table(gt, length=length, boxless=True, px_per_m=options.px_per_m)
-        return mot_text.truth_of_table(table, info.name, rate, length, options.scale, of_boxes.person_class)
 
     more: dict[str, Any] = {} if choice is None else {"background": str(choice)}
     more |= {} if pictures.numbering is None else {"numbering": astuple(pictures.numbering)}
@@ -138,23 +135,11 @@ def open_folder(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
 
 def left_pictures(path: Path) -> PictureFolder:
     """Returns the PictureFolder of the left camera of the MOTChallenge folder `path`."""
-    return _find_pictures(path, _info(path))
-
-
-def _info(path: Path) -> SeqInfo:
-    ini = path / "seqinfo.ini"
-    return read_seqinfo(ini) if is_present(ini) else SeqInfo(path.name, None, None, None)
-
-
-def _find_pictures(path: Path, info: SeqInfo) -> PictureFolder:
+    info = read_seqinfo(path / "seqinfo.ini")
     texts = is_present(path / "gt" / "gt.txt") or is_present(path / "det" / "det.txt")
     return find_pictures(path / info.image_dir, info.length, (lambda: _labelled_frames(path)) if texts else None)
 
 
-def _frames(text: Path) -> Ints:
-    return read_table(text, boxless=True, px_per_m=1.0).frame
-
-
 def _labelled_frames(path: Path) -> Ints:
     texts = filter(is_present, (path / "det" / "det.txt", path / "gt" / "gt.txt"))
-    return np.unique(np.concatenate([np.zeros(0, np.int64), *(_frames(text) for text in texts)]))
+    return np.unique(joined((read_table(text, px_per_m=1.0).frame for text in texts), kind=np.int64))

@@ -21,12 +21,12 @@ from typing import NoReturn
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from sim.arrays import repeated_ids
 from sim.store.numeric_text import CORRECT, NAME_THEM, NumericTable, TextRows, is_number_text, read_rows
 from sim.types import LENGTH_UNITS, Array, Bools, Ints
 from tracking.recordings.options import BoxScale
-from tracking.recordings.worded_cells import TIME_UNITS, are_numbers, in_seconds, instants, numbered
+from tracking.recordings.worded_cells import TIME_UNITS, in_seconds, instants, numbered
 
 ENOUGH = 10  # rows that are needed to judge by how their columns vary
 
@@ -58,12 +58,10 @@ def reject_missing_ids(rows: NumericTable) -> None:
     # make boxes of people one column earlier only, and the ids do not last.
     score = (values[:, 5] >= 0) & (values[:, 5] <= 1) & (values[:, 4] > 1) & (values[:, 3] > 1)
     earlier = values.shape[1] == 6 and _aspect(values[:, 1:5]) and not _aspect(values[:, 2:6]) and not _lasts(frame, id)
-    if score.all() or (len(values) >= ENOUGH and earlier):
-        raise InputError(
-            file=rows.file, place="columns", got=f"in {len(values)} lines what looks like {NO_ID} without an id",
-            expected="frame,id,left,top,width,height,…", remedy=f"write {NO_ID} as the first line, if they are these, "
-            "or -1 as the id",
-        )  # fmt: skip
+    missing = score.all() or (len(values) >= ENOUGH and earlier)
+    got = f"in {len(values)} lines what looks like {NO_ID} without an id"
+    remedy = f"write {NO_ID} as the first line, if they are these, or -1 as the id"
+    reject(missing, rows.file, got, "frame,id,left,top,width,height,…", remedy, "columns")
 
 
 def _aspect(box: Array) -> bool:
@@ -88,10 +86,9 @@ def reject_swapped(rows: NumericTable) -> None:
     """
     known = rows.values[rows.values[:, 1] >= 0]
     as_read, swapped = (_usual_steps(known[:, [*columns, 2, 3]]) for columns in ((1, 0), (0, 1)))
-    if (swapped + LEAST < SWAPPED * as_read).all():
-        got = f"steps of {as_read[0]:.3g}, but of {swapped[0]:.3g} if frame and id change places"
-        expected, remedy = "the frame first", "exchange columns 1 and 2, or name the columns in the first line"
-        raise InputError(file=rows.file, place="columns", got=got, expected=expected, remedy=remedy)
+    got = f"steps of {as_read[0]:.3g}, but of {swapped[0]:.3g} if frame and id change places"
+    remedy = "exchange columns 1 and 2, or name the columns in the first line"
+    reject((swapped + LEAST < SWAPPED * as_read).all(), rows.file, got, "the frame first", remedy, "columns")
 
 
 def _usual_steps(rows: Array) -> Array:
@@ -148,9 +145,8 @@ NAMES = {
         name + unit for name in ("t", "time", "timestamp", "datetime", "timestep_time")
         for unit in ("", *(f"_{unit}" for unit in TIME_UNITS))
     ),
-    "id": (
-        "id", "track_id", "trackid", "track", "tracker_id", "person_id", "ped_id", "target_id", "object_id", "agent_id"
-    ),
+    "id": ("id", "track_id", "trackid", "track", "tracker_id", "person_id", "ped_id", "target_id", "object_id",
+           "agent_id"),
     "score": ("score", "conf", "confidence"),
     "class": ("class", "class_id", "cls", "category", "category_id", "object_category"),
     "left": ("left", "bb_left", "box_left_px", "xmin", "x_min", "x1"),
@@ -227,8 +223,11 @@ def read_named(
     if words:
         classes, code = np.unique(words, return_inverse=True)
         rows, column["class"] = replace(rows, classes=tuple(classes.tolist())), code.astype(float)
-    if "lost" in column:
-        rows, column = _without_lost(rows, column)
+    lost = column.get("lost", np.zeros(0)) != 0
+    if lost.any():
+        said = f"{lost.sum()} of {len(lost)} rows are lost people, whom nobody saw, and are left out"
+        warnings.warn(f"{rows.file}: column lost: {said}", stacklevel=4)
+        rows, column = _kept(rows, column, ~lost)
     if "time" in column and frames_at is not None:
         seconds, id = column.pop("time"), column.get("id", np.zeros(len(rows.line)))
         seconds = seconds if is_instant else in_seconds(text.file, names[found["time"]], seconds, id)
@@ -257,13 +256,10 @@ def _reject_jitter(rows: NumericTable, frame: Column, seconds: Column, id: Colum
     row, before = order[1:], order[:-1]
     same = (frame[row] == frame[before]) & (id[row] == id[before]) & (seconds[row] != seconds[before])
     if same.any():
-        k = row[same.argmax()]
-        raise InputError(
-            file=rows.file, place=f"line {rows.line[k]}",
-            got=f"a second time of id {id[k]:.12g} in frame {frame[k]:.0f}",
-            expected="times that vary by less than half a frame",
-            remedy="number the times in order, 1, 2, 3, …, in a column frame, and give --fps",
-        )  # fmt: skip
+        k, expected = row[same.argmax()], "times that vary by less than half a frame"
+        got = f"a second time of id {id[k]:.12g} in frame {frame[k]:.0f}"
+        remedy = "number the times in order, 1, 2, 3, …, in a column frame, and give --fps"
+        raise InputError(file=rows.file, place=f"line {rows.line[k]}", got=got, expected=expected, remedy=remedy)
 
 
 def _with_somebody(text: TextRows, names: list[str]) -> TextRows:
@@ -276,9 +272,8 @@ def _with_somebody(text: TextRows, names: list[str]) -> TextRows:
     empty = np.array([len(row) == len(names) and not any(row[k].strip('" ') for k in use) for row in cells])
     if not empty.any() or empty[1:].all():
         return text
-    warnings.warn(
-        f"{text.file}: {empty.sum()} rows have nobody in columns {', '.join(names[k] for k in use)}", stacklevel=5
-    )
+    read = ", ".join(names[k] for k in use)
+    warnings.warn(f"{text.file}: {empty.sum()} rows have nobody in columns {read}", stacklevel=5)
     return TextRows(text.file, tuple(compress(text.text, ~empty)), text.line[~empty])
 
 
@@ -309,10 +304,8 @@ def _columns(text: TextRows, names: list[str], found: dict[str, int]) -> tuple[N
     try:
         rows = read()
     except InputError:
-        cells = {
-            meaning: text.words(found[meaning], first=1) for meaning in ("id", "group", "time") if meaning in found
-        }
-        worded |= {meaning: each for meaning, each in cells.items() if not are_numbers(each)}
+        cells = {m: text.words(found[m], first=1) for m in ("id", "group", "time") if m in found}
+        worded |= {m: each for m, each in cells.items() if not all(map(is_number_text, set(each)))}
         if not worded:
             raise
         rows = read()
@@ -324,14 +317,6 @@ def _columns(text: TextRows, names: list[str], found: dict[str, int]) -> tuple[N
     if "time" in worded:
         column["time"] = instants(rows, worded["time"])
     return rows, column, "time" in worded
-
-
-def _without_lost(rows: NumericTable, column: dict[str, Column]) -> tuple[NumericTable, dict[str, Column]]:
-    lost = column["lost"] != 0
-    if lost.any():
-        said = f"{lost.sum()} of {len(lost)} rows are lost people, whom nobody saw, and are left out"
-        warnings.warn(f"{rows.file}: column lost: {said}", stacklevel=5)
-    return _kept(rows, column, ~lost)
 
 
 def _kept(rows: NumericTable, column: dict[str, Column], keep: Bools) -> tuple[NumericTable, dict[str, Column]]:
@@ -357,11 +342,8 @@ def _in_order(
     """
     frame, have = column["frame"], {*column}
     used = have & {"frame", "id", "group", "lost"} | {"time"}
-    column = {
-        "id": np.full_like(frame, -1.0),
-        "class": np.full_like(frame, -1.0),
-        "score": np.ones_like(frame),
-    } | column
+    none = np.full_like(frame, -1.0)
+    column = {"id": none, "class": none, "score": np.ones_like(frame)} | column
     form = next((form for form in BOXES if have >= {*form} and (form != CORNERS or _are_corners(column))), None)
     place = next((place for place in PLACES if have >= {"id", *place}), None)
     if form is None and place is not None:
@@ -393,10 +375,9 @@ def _metres(text: TextRows, unit: str, px_per_m: float | None) -> float:
     if unit != "px":
         return LENGTH_UNITS.get(unit, 1.0)
     if px_per_m is None:
-        raise InputError(
-            file=text.file, place="columns x_px, y_px", got="pixels, without a scale", expected="metres, or a scale",
-            remedy="add --px-per-m, the pixels per metre",
-        )  # fmt: skip
+        place, got, expected = "columns x_px, y_px", "pixels, without a scale", "metres, or a scale"
+        remedy = "add --px-per-m, the pixels per metre"
+        raise InputError(file=text.file, place=place, got=got, expected=expected, remedy=remedy)
     return 1 / px_per_m
 
 
@@ -441,33 +422,36 @@ class MotTable:
 
 
 def read_table(
-    path: Path, *, length: int | None = None, boxless: bool = False, box_scale: BoxScale | None = None,
-    frames_at: FramesAt | None = None, px_per_m: float | None = None,
+    path: Path, *, length: int | None = None, box_scale: BoxScale | None = None, frames_at: FramesAt | None = None,
+    px_per_m: float | None = None,
 ) -> MotTable:  # fmt: skip
     """Returns the MotTable of a MOTChallenge text of 6 to 10 columns, or of 4: frame, id, x, y in m.
 
-    length: the last frame allowed. boxless: True allows -1,-1,-1,-1 for "no box". box_scale: factors that make the
-    boxes pixels. frames_at, px_per_m: as `read_named` takes them. Rows stay in the order of the file.
+    length: the last frame allowed. box_scale: factors that make the boxes pixels. frames_at, px_per_m: as `read_named`
+    takes them. Rows stay in the order of the file.
     """
     text = read_rows(path, heading=True)
     first = next(text.cells(), [])
     if len(first) == len(STANFORD.split()) and first[-1].startswith('"') and is_number_text(first[0]):
         text = TextRows(path, (STANFORD, *text.text), np.insert(text.line, 0, 0))
-    named = column_names(text)
+    named, group = column_names(text), None
     if named is not None:
         rows, group = read_named(text, named, frames_at, px_per_m)
-        return table_of_rows(rows, length, boxless, box_scale, group)
-    rows = text.numbers((GROUND_COLUMNS, *range(6, 11)), layout=LAYOUT)
-    reject_missing_ids(rows)
-    reject_swapped(rows)
-    return table_of_rows(rows, length, boxless, box_scale)
+    else:
+        rows = text.numbers((GROUND_COLUMNS, *range(6, 11)), layout=LAYOUT)
+        reject_missing_ids(rows)
+        reject_swapped(rows)
+    return table_of_rows(rows, length, box_scale, group)
 
 
 def table_of_rows(
-    rows: NumericTable, length: int | None = None, boxless: bool = False, box_scale: BoxScale | None = None,
-    group: Ints | None = None,
+    rows: NumericTable, length: int | None = None, box_scale: BoxScale | None = None, group: Ints | None = None,
+    boxless: bool = True,
 ) -> MotTable:  # fmt: skip
-    """Returns the MotTable of rows in the columns of a MOTChallenge text. Arguments as for `read_table`."""
+    """Returns the MotTable of rows in the columns of a MOTChallenge text. Arguments as for `read_table`.
+
+    boxless: True allows -1,-1,-1,-1 for "no box".
+    """
     frame, id, count = rows.integers(0, "frame", SECONDS), rows.integers(1, "id"), len(rows.line)
     box, rest = rows.values[:, 2:6], rows.values[:, 6:]
     if rows.values.shape[1] <= GROUND_COLUMNS + 1:

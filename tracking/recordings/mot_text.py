@@ -24,7 +24,7 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.reading import is_present
 from sim.arrays import repeated_ids
 from sim.geometry.boxes import centres
@@ -37,7 +37,7 @@ from tracking.recordings.biwi import labels_of
 from tracking.recordings.labelled_truth import warn_of_places, with_labels
 from tracking.recordings.mot_table import GROUND_COLUMNS, PEOPLE, MotTable, corner_doubt, read_table, require_pixels
 from tracking.recordings.options import NO_OPTIONS, RATES, BoxOptions, Classes, RecordingOptions
-from tracking.recordings.worded_cells import usual_step
+from tracking.recordings.worded_cells import SHOWN, usual_step
 
 # step in m from one frame to the next that nobody makes. The frame rate may be wrong, so speeds decide nothing.
 LONGEST = 12.0
@@ -181,8 +181,6 @@ LABELS = "gt.txt"  # name of a text of labels. Its column 7 is a flag; that of a
 
 LAST_CLASS = 100  # greatest class of the usual sets of classes; COCO has up to 91
 
-SHOWN = 8  # most values that a message lists
-
 
 def labelled_people(table: MotTable, person_class: Classes | None) -> Bools:
     """Returns flags (N,) of rows that are people: an id from 0, another flag than 0, the right class.
@@ -190,17 +188,14 @@ def labelled_people(table: MotTable, person_class: Classes | None) -> Bools:
     person_class: the classes of people; None: 1, or PEOPLE if classes are words, with a warning about other classes.
     """
     keep, file = np.asarray(table.id >= 0), table.rows.file
-    if len(keep) and not keep.any():
-        got, remedy = f"negative ids in all {len(keep)} rows", "give each person an id"
-        raise InputError(file=file, place="column 2", got=got, expected="ids from 0", remedy=remedy)
+    got = f"negative ids in all {len(keep)} rows"
+    reject(len(keep) and not keep.any(), file, got, "ids from 0", "give each person an id", "column 2")
     flag = table.scores()
     # Column 7 of another text may be a confidence.
     if file.name == LABELS or (np.isin(flag, (0, 1, -1)).all() and flag.any()):
         keep &= flag != 0
-        if len(keep) and not keep.any():
-            got, expected = f"0 in all {len(keep)} rows, which leaves nobody", "another flag than 0 for people"
-            remedy = "write 1 in column 7 of rows that count"
-            raise InputError(file=file, place="column 7", got=got, expected=expected, remedy=remedy)
+        got, remedy = f"0 in all {len(keep)} rows, which leaves nobody", "write 1 in column 7 of rows that count"
+        reject(len(keep) and not keep.any(), file, got, "another flag than 0 for people", remedy, "column 7")
     return of_class(table, keep, person_class)
 
 
@@ -224,9 +219,8 @@ def of_class(table: MotTable, keep: Bools, person_class: Classes | None) -> Bool
     counts = np.bincount(row[keep & ~people], minlength=len(name))
     others = [f"{n} rows of class {each}" for each, n in zip(name, counts, strict=True) if n]
     said, people_are = ", ".join(others[:SHOWN]) + ", …" * (len(others) > SHOWN), " or ".join(wanted)
-    if not people.any():
-        remedy = "name the classes of people with --class, those of labels and tracks, as 0,1"
-        raise InputError(file=file, place="classes", got=said, expected=f"people, of class {people_are}", remedy=remedy)
+    remedy = "name the classes of people with --class, those of labels and tracks, as 0,1"
+    reject(not people.any(), file, said, f"people, of class {people_are}", remedy, "classes")
     if others and person_class is None:
         text = f"{file}: {said} are left out; people are class {people_are} (--class says otherwise)"
         warnings.warn(text, stacklevel=3)
@@ -257,11 +251,10 @@ def _reject_categories(table: MotTable) -> None:
     few = 2 <= len(values) <= SHOWN and ENOUGH * len(values) <= len(column) and (values == np.round(values)).all()
     one = (id < 0).all() or len(np.unique(np.c_[id, column], axis=0)) == len(np.unique(id))
     if few and one and values[0] >= 0 and 2 <= values[-1] <= LAST_CLASS:
-        raise InputError(
-            file=table.rows.file, place="column 7", got=f"{', '.join(f'{v:g}' for v in values)}, as classes have",
-            expected="a confidence, or a flag 0 or 1", remedy="name the columns in the first line: "
-            "frame,id,left,top,width,height,class (…,score if it is one)",
-        )  # fmt: skip
+        got, file = f"{', '.join(f'{v:g}' for v in values)}, as classes have", table.rows.file
+        expected = "a confidence, or a flag 0 or 1"
+        remedy = "name the columns in the first line: frame,id,left,top,width,height,class (…,score if it is one)"
+        raise InputError(file=file, place="column 7", got=got, expected=expected, remedy=remedy)
 
 
 def _one_for_each(table: MotTable, column: Array) -> bool:
@@ -344,8 +337,7 @@ def detections_of_table(table: MotTable, options: BoxOptions) -> DetectionTable:
         got, expected = options.min_score, f"at most {raw.max():g}, the greatest score"
         raise InputError(file=path, place="--min-score", got=got, expected=expected, remedy="lower it")
     rows, score = rows[good], score[good]
-    box = None if boxless.any() else table.box[rows]
-    return DetectionTable(table.frame[rows], plane, pos[rows], box, score)
+    return DetectionTable(table.frame[rows], plane, pos[rows], None if boxless.any() else table.box[rows], score)
 
 
 def _places(table: MotTable) -> tuple[Array | None, Bools]:
@@ -368,7 +360,7 @@ def truth_of_table(
 
     length: None: up to the last frame kept. px_per_m: nan: the boxes' median height / 1.7 m. Boxes are None if a row
     has none. Positions and velocities are None if no row has a position, else nan in rows without. Groups are those of
-    a column `group`, or of the file that `group_file` names.
+    a column `group`, or of a file: groups.txt beside gt.txt, NAME.groups.txt beside any other NAME.txt.
     """
     require_metres(table, fps)
     ground, boxless = _places(table)
@@ -385,29 +377,23 @@ def truth_of_table(
         v = table.rest[:, 2]
         table.rows.reject((v > 1) | ((v < 0) & (v != -1)), "visibility from 0 to 1, or -1", "correct the last column")
         visibility = np.where(v[order] < 0, 1.0, v[order])
-    place = None if ground is None else ground[order]
+    pos = None if ground is None else ground[order, :2]
+    vel = None if pos is None else differentiate(frame, id, pos, fps)
     if not np.isfinite(px_per_m) and boxed:
         px_per_m = scale_of_all_boxes(box[:, 3])
     frames = length if length is not None else int(frame.max(initial=0))
     truth = Truth(
         name=name, fps=fps, length=frames, px_per_m=px_per_m, frame=frame, id=id,
-        group=np.full(len(order), -1, np.int64),
-        pos=None if place is None else place[:, :2],
-        vel=None if place is None else differentiate(frame, id, place[:, :2], fps),
-        box=box if boxed else None, visibility=visibility,
-        z=None if place is None else place[:, 2],
-        labelled=np.zeros(frames, bool), unscored=unscored_rows(table, keep, name, person_class) if boxed else None,
+        group=np.full(len(order), -1, np.int64), pos=pos, vel=vel, box=box if boxed else None, visibility=visibility,
+        z=None if ground is None else ground[order, 2], labelled=np.zeros(frames, bool),
+        unscored=unscored_rows(table, keep, name, person_class) if boxed else None,
     )  # fmt: skip
     warn_of_places(table.rows.file, truth)
     if table.group is not None:
         return with_labels(truth, table.group[order])
-    path = group_file(table.rows.file)
+    path = table.rows.file
+    path = path.with_name("groups.txt" if path.name == LABELS else f"{path.stem}.groups.txt")
     return with_labels(truth, labels_of(path, id)) if is_present(path) else truth
-
-
-def group_file(path: Path) -> Path:
-    """Returns the path of a text's groups: groups.txt beside gt.txt, NAME.groups.txt beside any other NAME.txt."""
-    return path.with_name("groups.txt" if path.name == LABELS else f"{path.stem}.groups.txt")
 
 
 FPS = 25.0
@@ -425,10 +411,9 @@ def rate_of_times(path: Path, seconds: Array, id: Array) -> float:
     """Returns the frames per second at which times (N,) of one id (N,) follow each other, where none is missing."""
     step = usual_step(seconds, id)
     rate = 1 / step if step else 1.0
-    if not RATES[0] <= rate <= RATES[1]:
-        got, expected = f"{rate:.3g} per second", "{:g} to {:g} times per second".format(*RATES)
-        remedy = "correct the unit in the name of the column (t_s, t_ms, t_us, t_ns), or give --fps"
-        raise InputError(file=path, place="times", got=got, expected=expected, remedy=remedy)
+    expected = "{:g} to {:g} times per second".format(*RATES)
+    remedy = "correct the unit in the name of the column (t_s, t_ms, t_us, t_ns), or give --fps"
+    reject(not RATES[0] <= rate <= RATES[1], path, f"{rate:.3g} per second", expected, remedy, "times")
     return round(float(rate), 3)
 
 
@@ -449,21 +434,18 @@ def open_text(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
         fps, begin = fps or rate_of_times(path, seconds, id), float(seconds.min(initial=np.inf))
         return frames_of_times(seconds, begin, fps)
 
-    table = read_table(path, boxless=True, box_scale=of_boxes.box_scale, frames_at=frames_at, px_per_m=options.px_per_m)
+    table = read_table(path, box_scale=of_boxes.box_scale, frames_at=frames_at, px_per_m=options.px_per_m)
     rate = frame_rate(fps, None)
-    if not len(table.frame):
-        raise InputError(file=path, got="no row", expected="people or detections", remedy="check the file")
+    reject(not len(table.frame), path, "no row", "people or detections", "check the file")
     length = int(table.frame.max())
-
-    def truth() -> Truth:
-        return truth_of_table(table, path.stem, rate, length, options.scale, of_boxes.person_class)
 
     require_classes(table, of_boxes.person_class)
     if (table.id == -1).all():
         more: dict[str, Any] = {"detections": partial(detections_of_table(table, of_boxes).at, fps=rate)}
     else:
         options.reject(path, "a text of people with ids", "it is for detections", "min_score")
-        more = {"load_truth": truth}
+        known = (path.stem, rate, length, options.scale, of_boxes.person_class)
+        more = {"load_truth": partial(truth_of_table, table, *known)}
     source = {"kind": "mot text", "path": str(path), "begin": begin, **of_boxes.given()}
     if table.rows.names:
         source["ids"] = dict(table.rows.names)

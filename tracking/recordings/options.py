@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from scenarios.errors import InputError
+from scenarios.errors import reject
 from scenarios.limits import PICTURE_SIDE
 from sim.pictures.background_sample import BackgroundChoice
 from sim.store.numeric_text import number_or_nan
@@ -57,9 +57,8 @@ def refuse_options(values: Mapping[str, Any], names: str, path: Path, kind: str,
     """Raises InputError if an option in `names` ("camera fps") is given, because it has no effect on a `kind`."""
     found = [name for name in names.split() if values[name] is not None and values[name] is not False]
     given = [f"--{name.removeprefix('person_').replace('_', '-')}" for name in found]
-    if given:
-        remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
-        raise InputError(file=path, got=" and ".join(given), expected=f"none for {kind}", remedy=remedy)
+    remedy = f"leave {'it' if len(given) == 1 else 'them'} out: {why}"
+    reject(given, path, " and ".join(given), f"none for {kind}", remedy)
 
 
 NO_OPTIONS = RecordingOptions()
@@ -67,19 +66,16 @@ NO_OPTIONS = RecordingOptions()
 
 def parse_box_scale(text: str) -> BoxScale:
     """Returns the factors of x and y in a text such as "2" (both) or "1920,1080"; raises InputError for other texts."""
-    cells = text.split(",")
-    factors = list(map(number_or_nan, cells))
-    if len(cells) > 2 or not all(0 < f <= PICTURE_SIDE for f in factors):
-        got, expected = repr(text), f"X or X,Y, above 0, at most {PICTURE_SIDE}"
-        remedy = "give pixels of the picture per unit of the boxes"
-        raise InputError(place="--box-scale", got=got, expected=expected, remedy=remedy)
+    factors = list(map(number_or_nan, text.split(",")))
+    wrong = len(factors) > 2 or not all(0 < f <= PICTURE_SIDE for f in factors)
+    expected, remedy = f"X or X,Y, above 0, at most {PICTURE_SIDE}", "give pixels of the picture per unit of the boxes"
+    reject(wrong, "", repr(text), expected, remedy, "--box-scale")
     return factors[0], factors[-1]
 
 
 def parse_classes(given: int | str) -> Classes:
     """Returns the classes in a number or a text such as "1,2" or "person", as lower-case texts; else InputError."""
     classes = tuple(cell.strip().lower() for cell in str(given).split(","))
-    if all(classes):
-        return classes
     expected = "classes apart by commas, as 1,2 or person"
-    raise InputError(place="--class", got=repr(given), expected=expected, remedy="correct it")
+    reject(not all(classes), "", repr(given), expected, "correct it", "--class")
+    return classes

@@ -18,11 +18,12 @@ import math
 import re
 import warnings
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import FRAME_RATES, is_number
 from scenarios.reading import parse_json
 from sim.arrays import repeated_ids
@@ -72,8 +73,7 @@ def layout_of(path: Path) -> str | None:
 def open_text(layout: str, path: Path, options: RecordingOptions) -> Sequence:
     """Returns a text as Sequence with truth, without pictures and detections. layout: as of `layout_of`."""
     rows, stated = LAYOUTS[layout](path, options.fps)
-    if not len(rows.line):
-        raise InputError(file=path, got="no row", expected="people with frame, id, x and y", remedy="restore it")
+    reject(not len(rows.line), path, "no row", "people with frame, id, x and y", "restore it")
     rate = frame_rate(options.fps, stated, "trajectories", ETH_FPS)
     return _sequence(path, rows, rate, int(rows.values[:, 0].max()), options, None)
 
@@ -81,7 +81,7 @@ def open_text(layout: str, path: Path, options: RecordingOptions) -> Sequence:
 def _sequence(
     path: Path, rows: NumericTable, rate: float, length: int, options: RecordingOptions, unscored: Unscored | None
 ) -> Sequence:
-    table = table_of_rows(rows, boxless=True)
+    table = table_of_rows(rows)
     rows.reject(table.id < 0, "ids from 0", "correct the id")
     reject_swapped(rows)
 
@@ -104,11 +104,10 @@ def _counted(rows: NumericTable, fps: float | None) -> NumericTable:
     rows.reject(repeated_ids(raw, id), "each id once in a frame", scenes, scenes)
     steps = np.diff(np.unique(raw))
     step = int(np.median(steps)) if len(steps) else STEPS[0]
-    if fps is None and not STEPS[0] <= step <= STEPS[1]:
-        low, high = STEPS
-        expected = f"steps of {low} to {high}, as of a video of which {ETH_FPS:g} frames per second are labelled"
-        got, remedy = f"frames in steps of {step}", "give --fps, rows of a person per second"
-        raise InputError(file=rows.file, place="--fps", got=got, expected=expected, remedy=remedy)
+    low, high = STEPS
+    expected = f"steps of {low} to {high}, as of a video of which {ETH_FPS:g} frames per second are labelled"
+    got, remedy = f"frames in steps of {step}", "give --fps, rows of a person per second"
+    reject(fps is None and not STEPS[0] <= step <= STEPS[1], rows.file, got, expected, remedy, "--fps")
     return replace(rows, values=np.column_stack([frame_numbers(raw, id), rows.values[:, 1:]]))
 
 
@@ -121,10 +120,8 @@ def _read_pedpy(path: Path, fps: float | None) -> People:
     rates = {rate.rstrip(".") for rate in FRAMERATE.findall(comments)}
     values = {number_or_nan(rate) for rate in rates}
     stated = values.pop() if len(values) == 1 else None
-    if not is_number(fps or stated, *FRAME_RATES):
-        expected = "frames per second from {:g} to {:g}".format(*FRAME_RATES)
-        got = " and ".join(sorted(rates)) or "none"
-        raise InputError(file=path, place="# framerate", got=got, expected=expected, remedy="correct it, or give --fps")
+    expected, got = "frames per second from {:g} to {:g}".format(*FRAME_RATES), " and ".join(sorted(rates)) or "none"
+    reject(not is_number(fps or stated, *FRAME_RATES), path, got, expected, "correct it, or give --fps", "# framerate")
     rows = read_rows(path).numbers(range(4, 13), layout="id frame x y z")
     raw = rows.integers(1, "frame")
     words = "_".join(re.findall(r"[^\W_]+", comments.lower())) + "_"
@@ -135,9 +132,10 @@ def _read_pedpy(path: Path, fps: float | None) -> People:
 
 def _read_ndjson(path: Path, fps: float | None) -> People:
     text, kept, rows, rates = read_rows(path), list[int](), list[list[float]](), set[float]()
+    is_place = partial(is_number, low=-LARGEST, high=LARGEST)
     for number, line in zip(text.line.tolist(), text.text, strict=True):
         match _json(path, number, line):
-            case {"track": {"f": f, "p": p, "x": x, "y": y}} if all(map(_is_place, (f, p, x, y))):
+            case {"track": {"f": f, "p": p, "x": x, "y": y}} if all(map(is_place, (f, p, x, y))):
                 rows.append([f, p, x, y])
                 kept.append(number)
             case {"scene": {"fps": rate}} if is_number(rate, *FRAME_RATES):
@@ -151,10 +149,6 @@ def _read_ndjson(path: Path, fps: float | None) -> People:
                 raise _bad(path, number, line.strip()[:80], expected)
     values, stated = np.array(rows, np.float64).reshape(-1, 4), next(iter(rates), None)
     return _counted(NumericTable(path, values, np.array(kept, np.int64), "f, p, x, y"), fps or stated), stated
-
-
-def _is_place(value: object) -> bool:
-    return is_number(value, -LARGEST, LARGEST)
 
 
 def _json(path: Path, number: int, line: str) -> object:
@@ -214,8 +208,7 @@ def _kitti_rows(path: Path, classes: Classes) -> tuple[NumericTable, Words]:
     kinds = np.array([word.lower() for word in text.words(2)], np.str_)
     if len(kinds) and not np.isin(kinds, classes).any():
         found, wanted = ", ".join(np.unique(kinds).tolist()), " or ".join(classes)
-        if not {*classes} <= ALIKE.keys():
-            raise InputError(file=path, place="--class", got=found, expected=wanted, remedy="name some of these")
+        reject(not {*classes} <= ALIKE.keys(), path, found, wanted, "name some of these", "--class")
         warnings.warn(f"{path}: no {wanted}, only {found} (--class names others)", stacklevel=4)
     return rows, kinds
 

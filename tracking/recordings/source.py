@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import FRAME_RATES, SCALES, is_number
 from scenarios.reading import is_present, require_regular
 from sim.pictures.background_sample import parse_choice
@@ -75,9 +75,8 @@ def open_source(
     """
     path = Path(path)
     for option, value, (low, high) in (("--fps", fps, FRAME_RATES), ("--px-per-m", px_per_m, SCALES)):
-        if value is not None and not is_number(value, low, high):
-            expected = f"a number from {low:g} to {high:g}"
-            raise InputError(place=option, got=value, expected=expected, remedy=f"correct {option}")
+        expected = f"a number from {low:g} to {high:g}"
+        reject(value is not None and not is_number(value, low, high), "", value, expected, f"correct {option}", option)
     if isinstance(camera, str | Path):
         camera = read_calibration(Path(camera))
     of_boxes = BoxOptions(
@@ -89,9 +88,8 @@ def open_source(
         of_boxes if boxes is None else BoxOptions(),
     )  # fmt: skip
     sequences = _open(path, options)
-    if boxes is not None and len(sequences) > 1:
-        got, remedy = f"{len(sequences)} sequences", "give one of them"
-        raise InputError(place="--boxes", got=got, expected="one sequence", remedy=remedy)
+    got = f"{len(sequences)} sequences"
+    reject(boxes is not None and len(sequences) > 1, "", got, "one sequence", "give one of them", "--boxes")
     if boxes is not None:
         sequences = [with_boxes(sequences[0], Path(boxes), of_boxes)]
     return sequences if camera is None else [_with_checked_camera(each) for each in sequences]
@@ -123,8 +121,7 @@ def _check_camera(sequence: Sequence, box: Array) -> None:
 
 
 def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
-    if not os.path.exists(path):
-        raise InputError(file=path, got="nothing there", expected=KINDS, remedy="check the path")
+    reject(not os.path.exists(path), path, "nothing there", KINDS, "check the path")
     if not os.path.isdir(path):
         require_regular(path)
         return [_open_one(path, options)]
@@ -167,10 +164,9 @@ def generated_folders(path: Path) -> list[Path]:
     """
     found = _find(path, DEPTH) if path.is_dir() else []
     other = next((p for p in found if _kind(p) != "generated"), None)
-    if not found or other is not None:
-        got = "no sequences" if other is None else f"a recording, {other.name}"
-        expected, remedy = "a generated sequence or dataset", "give what `flockscope generate` made"
-        raise InputError(file=path, got=got, expected=expected, remedy=remedy)
+    got = "no sequences" if other is None else f"a recording, {other.name}"
+    wrong, remedy = not found or other is not None, "give what `flockscope generate` made"
+    reject(wrong, path, got, "a generated sequence or dataset", remedy)
     return found
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from scenarios.limits import FRAMES
 from sim.geometry.boxes import centres
 from sim.store import group_files
@@ -21,16 +21,9 @@ from sim.store.seal import WHOLE, check_run, run_folder
 from sim.store.track_files import read_run, with_events
 from sim.truth.velocities import chords
 from sim.types import Array, Groups, Ints, Plane, Tracks
-from tracking.recordings import people_texts
+from tracking.recordings import mot_text, people_texts
 from tracking.recordings.mot_table import read_table, require_pixels, table_of_rows
-from tracking.recordings.mot_text import (
-    frames_of_times,
-    ground_positions,
-    of_class,
-    reject_duplicate_ids,
-    require_metres,
-    unit_scores,
-)  # fmt: skip
+from tracking.recordings.mot_text import of_class, unit_scores
 from tracking.recordings.options import BoxScale, Classes
 
 
@@ -67,9 +60,8 @@ def read_checked_tracks(
     if whole and run_folder(path) is not None:
         return read_run(folder)
     text = folder / "tracks.txt" if path.is_dir() else path
-    if not text.is_file():
-        got, expected = "no tracks", "tracks.parquet, tracks.txt or a MOTChallenge text"
-        raise InputError(file=path, got=got, expected=expected, remedy="give the folder that `flockscope track` made")
+    expected = "tracks.parquet, tracks.txt or a MOTChallenge text"
+    reject(not text.is_file(), path, "no tracks", expected, "give the folder that `flockscope track` made")
     found = read_track_text(text, 25.0 if fps is None else fps, length, person_class, box_scale, px_per_m, begin)
     if not whole:
         return found
@@ -89,7 +81,7 @@ def read_track_text(
     """
 
     def frames_at(seconds: Array, _: Array) -> Ints:
-        frame = frames_of_times(seconds, begin, fps)
+        frame = mot_text.frames_of_times(seconds, begin, fps)
         early = frame < 1
         if len(frame) and (early | (frame > (length or FRAMES))).mean() > 0.5:
             got, expected = f"{seconds.min():.15g} to {seconds.max():.15g} s", f"times from {begin:.15g} s on"
@@ -100,26 +92,23 @@ def read_track_text(
         return np.maximum(frame, 0)
 
     if people_texts.layout_of(path) == "kitti":
-        table = table_of_rows(people_texts.kitti_tracks(path, person_class), length, box_scale=box_scale)
+        table = table_of_rows(people_texts.kitti_tracks(path, person_class), length, box_scale, boxless=False)
     else:
-        table = read_table(
-            path, length=length, boxless=True, box_scale=box_scale, frames_at=frames_at, px_per_m=px_per_m
-        )
+        table = read_table(path, length=length, box_scale=box_scale, frames_at=frames_at, px_per_m=px_per_m)
     require_pixels(table.rows, table.boxes())
     if not len(table.frame):
         if length is None:
             raise InputError(file=path, got="no row", expected="tracks", remedy="check that it was written")
         warnings.warn(f"{path}: no row, so nobody was tracked", stacklevel=3)
-    table.rows.reject(
-        table.id < 0, "ids from 0", "give each track an id", "these are detections: `flockscope track` them first"
-    )
+    most = "these are detections: `flockscope track` them first"
+    table.rows.reject(table.id < 0, "ids from 0", "give each track an id", most)
     people = of_class(table, np.ones(len(table.id), bool), person_class)
-    reject_duplicate_ids(table, people)
+    mot_text.reject_duplicate_ids(table, people)
     order = np.lexsort((table.id, table.frame))
     order = order[people[order]]
     frame, id = table.frame[order], table.id[order]
-    require_metres(table, fps)
-    ground = ground_positions(table)
+    mot_text.require_metres(table, fps)
+    ground = mot_text.ground_positions(table)
     if ground is not None:
         remedy = "complete the line, or write z = -1 in all"
         table.rows.reject(np.isnan(ground[:, 0]), "a ground position (z other than -1), as in other lines", remedy)

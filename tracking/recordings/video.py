@@ -19,7 +19,7 @@ from sim.pictures.background_sample import BackgroundChoice, BackgroundSample
 from sim.pictures.picture_folder import fill_gaps, require_size, size_of
 from sim.scene.camera import scaled_to_image
 from sim.store.recorded_sequence import recorded_sequence
-from sim.types import Array, Bools, Image, Sequence
+from sim.types import Array, Image, Sequence
 from tracking.recordings.options import NO_OPTIONS, RATES, RecordingOptions
 
 SUFFIXES = (
@@ -52,11 +52,16 @@ def open_video(path: Path, options: RecordingOptions = NO_OPTIONS) -> Sequence:
     choice = (options.background or BackgroundChoice()).of(length, path, size)
     times = None if options.fps is not None or index.ranks() is None or is_steady(index.times()) else index.times()
     source = {"kind": "video", "path": str(path), "fps": words, "background": str(choice)}
+
+    def pictures(wanted: list[int] | None = None) -> Iterator[tuple[int, Image]]:
+        found = video_files.decode_frames(path, index, wanted)
+        return ((k, require_size(picture, size, path, f"frame {k}")) for k, picture in found)
+
     return recorded_sequence(
         source, path.stem, rate, length, times=None if times is None else (times - times[0]).tolist(),
-        left=lambda: fill_gaps(_pictures(path, index, size), length, path.name), image_size=size,
+        left=lambda: fill_gaps(pictures(), length, path.name), image_size=size,
         camera=options.camera and scaled_to_image(options.camera, size, path, index.aspect), px_per_m=options.scale,
-        load_background=BackgroundSample(choice, length, path, lambda wanted: _pictures(path, index, size, wanted)),
+        load_background=BackgroundSample(choice, length, path, pictures),
     )  # fmt: skip
 
 
@@ -76,23 +81,16 @@ def frame_rate(name: str, given: float | None, index: video_files.PacketIndex) -
     # Containers often state a wrong rate: it must agree with the stamps, or they tell none.
     if _plausible(header) and (not _plausible(timed) or (steady and abs(header / timed - 1) <= AGREE)):
         return header, f"{header:g}, as the container says"
+    rate, text = DEFAULT_FPS, f"{DEFAULT_FPS:g} (the container says {header:g}, its time stamps {timed:g})"
     if _plausible(timed):
         varying = "" if steady else ", which vary"
-        text = f"{timed:g} by its time stamps{varying} (the container says {header:g})"
-        rate = timed
-    else:
-        text = f"{DEFAULT_FPS:g} (the container says {header:g}, its time stamps {timed:g})"
-        rate = DEFAULT_FPS
+        rate, text = timed, f"{timed:g} by its time stamps{varying} (the container says {header:g})"
     warnings.warn(f"{name}: frames per second taken as {text}; --fps says otherwise", stacklevel=3)
     return rate, text
 
 
 def _plausible(rate: float) -> bool:
     return RATES[0] <= rate <= RATES[1]
-
-
-def _is_gap(step: Array) -> Bools:
-    return np.asarray(step > max(GAP, GAPS * float(np.median(step)) if len(step) else 0.0))
 
 
 def is_steady(times: Array) -> bool:
@@ -106,14 +104,6 @@ def is_steady(times: Array) -> bool:
 def stamped_rate(index: video_files.PacketIndex) -> float:
     """Returns the frames per second by the packets' time stamps, without gaps; 0 with fewer than two stamps."""
     step = np.diff(index.times())
-    step = step[~_is_gap(step)]
+    gap = max(GAP, GAPS * float(np.median(step)) if len(step) else 0.0)
+    step = step[step <= gap]
     return round(len(step) / float(step.sum()), 3) if len(step) else 0.0
-
-
-def _pictures(
-    path: Path, index: video_files.PacketIndex, size: tuple[int, int], wanted: list[int] | None = None
-) -> Iterator[tuple[int, Image]]:
-    return (
-        (k, require_size(picture, size, path, f"frame {k}"))
-        for k, picture in video_files.decode_frames(path, index, wanted)
-    )

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, reject
 from sim.store.numeric_text import CORRECT, LARGEST, NumericTable, is_number_text, read_number
 from sim.types import Array
 from tracking.recordings.options import RATES
@@ -21,12 +21,7 @@ from tracking.recordings.options import RATES
 TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # s
 UNITS = "s, ms, us or ns"
 NOTHING = ("", "none", "null", "nan", "na", "n/a", "<na>")  # cells of no value, in lower case
-SHOWN = 8  # most ids that a warning lists
-
-
-def are_numbers(cells: Sequence[str]) -> bool:
-    """Returns True if all cells of a column are numbers."""
-    return all(map(is_number_text, set(cells)))
+SHOWN = 8  # most ids or values that a message lists
 
 
 def usual_step(times: Array, id: Array) -> float:
@@ -48,14 +43,10 @@ def in_seconds(file: Path, name: str, times: Array, id: Array) -> Array:
     if not step:
         return times
     fit = [unit for unit, s in TIME_UNITS.items() if RATES[0] <= 1 / (step * s) <= RATES[1]]
-    if len(fit) != 1:
-        plain = name.removeprefix("timestep_")
-        raise InputError(
-            file=file, place=f"column {name}", got=f"times in steps of {step:.6g}, {' or '.join(fit) or 'in no unit'}",
-            expected="{:g} to {:g} times per second".format(*RATES),
-            remedy=f"name the column by its unit, {', '.join(f'{plain}_{unit}' for unit in TIME_UNITS)}; "
-            "or number frames 1, 2, 3, … in a column frame",
-        )  # fmt: skip
+    got = f"times in steps of {step:.6g}, {' or '.join(fit) or 'in no unit'}"
+    names = ", ".join(f"{name.removeprefix('timestep_')}_{unit}" for unit in TIME_UNITS)
+    remedy = f"name the column by its unit, {names}; or number frames 1, 2, 3, … in a column frame"
+    reject(len(fit) != 1, file, got, "{:g} to {:g} times per second".format(*RATES), remedy, f"column {name}")
     if fit != ["s"]:
         words = f"times in steps of {step:.6g} are taken as {fit[0]}"
         warnings.warn(f"{file}: column {name}: {words} (the name {name}_{fit[0]} says so)", stacklevel=5)
@@ -73,10 +64,8 @@ def _instant(rows: NumericTable, k: int, cell: str) -> float:
             return read_number(cell)
         found = datetime.fromisoformat(cell)
     except ValueError:
-        expected = "a number, or a time as 2024-05-01T12:00:00.5+02:00"
-        raise InputError(
-            file=rows.file, place=f"line {rows.line[k]}", got=repr(cell), expected=expected, remedy=CORRECT
-        ) from None
+        place, expected = f"line {rows.line[k]}", "a number, or a time as 2024-05-01T12:00:00.5+02:00"
+        raise InputError(file=rows.file, place=place, got=repr(cell), expected=expected, remedy=CORRECT) from None
     return (found if found.tzinfo else found.replace(tzinfo=UTC)).timestamp()
 
 
@@ -96,6 +85,5 @@ def numbered(rows: NumericTable, cells: Sequence[str], what: str) -> tuple[Array
     number = dict(zip(words, ends if own else range(1, len(words) + 1), strict=True))
     shown = ", ".join(f"{word} as {id}" for word, id in list(number.items())[:SHOWN]) + ", …" * (len(words) > SHOWN)
     warnings.warn(f"{rows.file}: {what}s in words are numbered: {shown}", stacklevel=5)
-    return np.array([number.get(cell, -1) for cell in cells], np.float64), tuple(
-        (id, word) for word, id in number.items()
-    )
+    names = tuple((id, word) for word, id in number.items())
+    return np.array([number.get(cell, -1) for cell in cells], np.float64), names

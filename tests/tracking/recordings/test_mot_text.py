@@ -154,13 +154,13 @@ def test_people_without_boxes(tmp_path):
     """Trajectories on the ground, as a text of one's own."""
     path = tmp_path / "walk.txt"
     path.write_text("1,1,-1,-1,-1,-1,1,3,4,0\n2,1,-1,-1,-1,-1,1,3.5,4,0\n2,2,10,10,20,50,1,6,4,0\n")
-    truth = mot_text.truth_of_table(read_table(path, boxless=True), "x", 2.0)
+    truth = mot_text.truth_of_table(read_table(path), "x", 2.0)
     assert truth.box is None
     assert np.isnan(truth.px_per_m)
     assert truth.pos.tolist() == [[3, 4], [3.5, 4], [6, 4]]
     path.write_text("1,1,-1,-1,-1,-1,1,3,4,0\n1,2,10,10,20,50,1,-1,-1,-1\n")
     with pytest.raises(InputError, match="a box, or x, y, z in every line") as error:
-        mot_text.truth_of_table(read_table(path, boxless=True), "x", 2.0)
+        mot_text.truth_of_table(read_table(path), "x", 2.0)
     assert error.value.place == "line 1"
 
 
@@ -168,7 +168,7 @@ def test_ground_positions_alone(tmp_path):
     """The shortest text of trajectories: frame, id, x, y."""
     path = tmp_path / "walk.csv"
     path.write_text("1 1 3 4\n2 1 3.5 -1\n2 2 -1 -1\n")
-    truth = mot_text.truth_of_table(read_table(path, boxless=True), "x", 2.0)
+    truth = mot_text.truth_of_table(read_table(path), "x", 2.0)
     assert truth.box is None
     assert truth.pos.tolist() == [[3, 4], [3.5, -1], [-1, -1]]
     assert truth.z.tolist() == [0, 0, 0]
@@ -179,7 +179,7 @@ def test_a_row_that_does_not_count_hides_no_duplicate(tmp_path):
     path = tmp_path / "gt.txt"
     path.write_text("1,1,10,10,20,50,1,1,1\n1,1,11,10,20,50,0,1,1\n1,1,12,10,20,50,1,1,1\n")
     with pytest.raises(InputError, match="each id once") as error:
-        mot_text.truth_of_table(read_table(path, boxless=True), "x", 10.0)
+        mot_text.truth_of_table(read_table(path), "x", 10.0)
     assert error.value.place == "line 3"
 
 
