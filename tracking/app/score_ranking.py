@@ -13,22 +13,10 @@ import numpy as np
 from scenarios.errors import counted, printable, shortened
 from sim.types import Sequence
 from tracking.app.command_result import CommandResult
-from tracking.app.score_tables import (
-    FEW,
-    GROUP_MATCH,
-    LOWER,
-    PEOPLE,
-    POOLED,
-    SIMILARITY,
-    TABLES,
-    arrow,
-    chance,
-    number,
-    table,
-)
+from tracking.app.score_tables import FEW, GROUP_MATCH, LOWER, PEOPLE, POOLED, SIMILARITY, TABLES, arrow, number, table
 from tracking.comparison import MATCHED, ComparedRuns, ComparedSequence, joined
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.stats import FEWEST, SURE, few, mean_of_known
+from tracking.stats import FEWEST, LEVEL, SURE, few, mean_of_known
 
 COLUMNS = ("HOTA", "MOTA", "IDF1", "group_F1", "pairwise_F1", "event_F1")  # Scores beside the one that ranks.
 LONGEST_NAME = 40  # Characters of an input or run that a table shows at most.
@@ -213,7 +201,7 @@ def _by_scenario(every: RankedRuns) -> tuple[dict[str, dict[str, float]], str]:
         values = {name: mean_of_known(known) for name, known in oracles.items()} | means[scenario]
         cells = [number(key, values[name], mean=True) + "*" * (name == best) for name in shown]
         rows.append([scenario, str(len(places)), *cells])
-    foot = f"* surely better than every other run; {chance(len(rows))}"
+    foot = f"* surely better than every other run; {_chance(len(rows))}"
     numbers = ["sequences", *(shortened(name, LONGEST_NAME) for name in shown)]
     return means, table(f"{arrow(key)} by scenario", ["scenario"], numbers, rows, foot=foot)
 
@@ -221,7 +209,7 @@ def _by_scenario(every: RankedRuns) -> tuple[dict[str, dict[str, float]], str]:
 def _score_differences(every: RankedRuns, pair: Mapping[str, Mapping[str, Any]]) -> str:
     known = [key for keys in TABLES.values() for key in keys if math.isfinite(pair[key]["mean"])]
     keys = [key for key in known if key != "objective" or usual_key(every.comparison) == key]
-    sure = [chance(len(keys))] if _can_be_sure(every.comparison, every.key) else []
+    sure = [_chance(len(keys))] if _can_be_sure(every.comparison, every.key) else []
     title, rows = f"{pair[every.key]['run']} minus {pair[every.key]['minus']}", {arrow(k): (k, pair[k]) for k in keys}
     return _difference_table(title, "score", rows, "; ".join([LOWER, *sure]))
 
@@ -233,6 +221,10 @@ def _difference_table(title: str, first: str, rows: Mapping[str, tuple[str, Mapp
         sure = f"surely {d['sure']}" if d["sure"] else words  # of the run named first
         cells.append([name, number(key, d["mean"], mean=True), interval(key, d), sure])
     return table(title, [first], ["difference", "95 % interval"], cells, [""], foot)
+
+
+def _chance(rows: int) -> str:
+    return f"of {counted(rows, 'row')} about {(1 - LEVEL) * rows:.2g} would be called sure by chance"
 
 
 def _can_be_sure(comparison: ComparedRuns, key: str) -> bool:

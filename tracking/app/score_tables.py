@@ -9,11 +9,11 @@ from io import StringIO
 
 import numpy as np
 
-from scenarios.errors import InputError, counted, printable
+from scenarios.errors import InputError, printable
 from tracking.scoring.catalogue import ALL, CATALOGUE
 from tracking.scoring.evaluation import Scores
 from tracking.scoring.pooled_scores import pooled
-from tracking.stats import FEWEST, LEVEL, score_interval
+from tracking.stats import FEWEST, score_interval
 
 # The keys that are shown where there is room for one line only.
 SHOWN = ("HOTA", "MOTA", "IDF1", "group_F1", "group_GDSR2", "group_MOTA", "pairwise_F1", "event_F1", "event_latency")
@@ -176,11 +176,6 @@ def _comparison_lines(rows: Rows, people: bool, groups: bool) -> list[str]:
 def arrow(key: str) -> str:
     """Returns the key of a score, with an arrow downwards if lower is better."""
     return f"{key} ↓" if CATALOGUE[key].better == "lower" else key
-
-
-def chance(rows: int) -> str:
-    """Returns a sentence on how many of `rows` rows would be called sure by chance, at 95 % each."""
-    return f"of {counted(rows, 'row')} about {(1 - LEVEL) * rows:.2g} would be called sure by chance"
 
 
 def number(key: str, value: float | None, *, mean: bool = False) -> str:

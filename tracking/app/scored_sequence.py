@@ -10,9 +10,9 @@ from typing import Any
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Sequence
-from tracking.app.commands.track import TrackerSetup
 from tracking.app.option_parsing import labelled
 from tracking.app.stored_tracks import StoredTracks, find_tracks, match_tracks
+from tracking.app.tracker_setup import TrackerSetup
 from tracking.comparison import ComparedSequence, compare_one
 from tracking.recordings.options import BoxScale, parse_box_scale
 from tracking.running.run import TrackingRun

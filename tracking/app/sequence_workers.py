@@ -55,28 +55,21 @@ def over_sequences(
 ) -> Iterator[R]:
     """Yields function(sequence, job) for each sequence and its job, in order, and shows the progress. what: word shown
     with the progress. source: from which other processes open the sequences. workers: greatest number of processes."""
-    several = min(workers, len(sequences)) > 1
-    found = _in_processes(function, sequences, jobs, source, workers) if several else map(function, sequences, jobs)
+    count, tasks = min(workers, len(sequences)), [(source, k, function, job) for k, job in enumerate(jobs)]
+    found = _in_processes(tasks, sequences, count) if count > 1 else map(function, sequences, jobs)
     with ProgressMeter(what, len(sequences)) as meter:
         for sequence, result in zip(sequences, found, strict=True):
             meter.step(sequence.name)
             yield result
 
 
-def _in_processes(
-    function: Callable[[Sequence, J], R],
-    sequences: SequenceOf[Sequence],
-    jobs: SequenceOf[J],
-    source: OpenedAs,
-    workers: int,
-) -> Iterator[R]:
+def _in_processes(tasks: list[_Task], sequences: SequenceOf[Sequence], workers: int) -> Iterator[Any]:
     from sim.workers.start import results_in_order, start_workers
 
     def lost(task: _Task, error: WorkError) -> _Outcome:
         return None, error.replaced(place=sequences[task[1]].name), []
 
-    tasks: list[_Task] = [(source, k, function, job) for k, job in enumerate(jobs)]
-    with start_workers(min(workers, len(sequences))) as run:
+    with start_workers(workers) as run:
         for value, error, texts in results_in_order(run, _outcome, tasks, lost):
             for text in texts:
                 warnings.warn(text, stacklevel=2)

@@ -12,20 +12,8 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import InputError, shortened
+from sim.store import seal
 from sim.store.own_files import is_hidden, output_paths
-from sim.store.seal import (
-    AGAIN,
-    RUN,
-    WHOLE,
-    check_run,
-    is_dataset,
-    is_run,
-    read_run,
-    reject_dataset,
-    reject_foreign,
-    run_folder,
-    tracked_hash,
-)  # fmt: skip
 from sim.types import Sequence
 from tracking.recordings.mot_table import size_doubt
 from tracking.recordings.mot_text import frame_rate
@@ -59,9 +47,9 @@ class StoredTracks:
     def check(self) -> None:
         """Raises InputError if flockscope stored these tracks and the run is unfinished, damaged or mixed with another.
         Tracks of other programs are not checked."""
-        folder = run_folder(self.path)
+        folder = seal.run_folder(self.path)
         if folder is not None:
-            check_run(folder)
+            seal.check_run(folder)
 
     def sequence(self, fps: float | None) -> Sequence:
         """Returns a `Sequence` without frames that stands for the tracked one, from run.json. fps: the frame rate,
@@ -82,16 +70,16 @@ class StoredTracks:
     def read(self, sequence: Sequence, box_scale: BoxScale | None = None) -> TrackingRun:
         """Reads the tracks and returns them as a run of this sequence, one `Tracks` per frame, with `info`. Raises
         InputError if they are of another sequence or frame rate. box_scale: factors of boxes in texts of others."""
-        fps, seal = self.info.get("fps"), self.folder / RUN
+        fps, stated = self.info.get("fps"), self.folder / seal.RUN
         if fps is not None and abs(fps - sequence.fps) > 1e-9 * sequence.fps:
             remedy = f"read the sequence with --fps {fps:g}, as `track` did, or track it again"
             expected = f"{sequence.fps:g} fps"
-            raise InputError(file=seal, place="fps", got=f"tracks at {fps:g} fps", expected=expected, remedy=remedy)
+            raise InputError(file=stated, place="fps", got=f"tracks at {fps:g} fps", expected=expected, remedy=remedy)
         tracked = self.info.get("truth_hash")
-        if tracked is not None and tracked_hash(sequence) not in (None, tracked):
+        if tracked is not None and seal.tracked_hash(sequence) not in (None, tracked):
             got, expected = f"tracks of another {sequence.name}", f"those of {sequence.source.get('path', 'this one')}"
-            remedy = f"{AGAIN}: its labels, scenario or settings are others"
-            raise InputError(file=seal, place="truth_hash", got=got, expected=expected, remedy=remedy)
+            remedy = f"{seal.AGAIN}: its labels, scenario or settings are others"
+            raise InputError(file=stated, place="truth_hash", got=got, expected=expected, remedy=remedy)
         tracks = read_checked_tracks(
             self.path, fps=sequence.fps, length=sequence.length, person_class=sequence.source.get("class"),
             box_scale=box_scale, px_per_m=sequence.px_per_m if sequence.px_per_m > 0 else None,
@@ -106,7 +94,7 @@ class StoredTracks:
 
 def holds_tracks(path: Path) -> bool:
     """Returns True if a path is a run that flockscope stored (its folder or a file), or a folder without sequences."""
-    own = run_folder(path) is not None and (path.is_dir() or path.name in WHOLE)
+    own = seal.run_folder(path) is not None and (path.is_dir() or path.name in seal.WHOLE)
     return own or (path.is_dir() and not holds_sequences(path))
 
 
@@ -116,9 +104,10 @@ def find_tracks(path: Path) -> list[StoredTracks]:
     if path.is_file() and path.suffix.lower() in OTHER_FILES:
         got = f"a {path.suffix.lower()} file, no tracks"
     elif path.is_file():
-        folder = run_folder(path)
-        found = [StoredTracks(None, path, read_run(folder) if folder is not None and path.name in WHOLE else {})]
-    elif is_dataset(path):
+        folder = seal.run_folder(path)
+        info = seal.read_run(folder) if folder is not None and path.name in seal.WHOLE else {}
+        found = [StoredTracks(None, path, info)]
+    elif seal.is_dataset(path):
         got, remedy = "a generated dataset, no tracks", "give the --out of `flockscope track`"
     elif path.is_dir():
         got, found = "no tracks", list(_below(path, DEPTH))
@@ -128,8 +117,8 @@ def find_tracks(path: Path) -> list[StoredTracks]:
 
 
 def _below(folder: Path, depth: int) -> list[StoredTracks]:
-    if is_run(folder):
-        info = read_run(folder) if (folder / RUN).is_file() else {}
+    if seal.is_run(folder):
+        info = seal.read_run(folder) if (folder / seal.RUN).is_file() else {}
         return [StoredTracks(info.get("sequence", folder.name), folder, info)]
     if (folder / "tracks.txt").is_file():
         return [StoredTracks(folder.name, folder, {})]
@@ -188,9 +177,9 @@ def _method(info: dict[str, Any]) -> dict[str, Any]:
 def check_place(folder: Path, tracker: str) -> None:
     """Raises InputError if a run of this tracker cannot be written into the folder, or would replace one of another
     tracker. Trackers of files are told apart by file name and class. An unfinished or damaged run may be replaced."""
-    reject_foreign(folder)
+    seal.reject_foreign(folder)
     try:
-        before = str(read_run(folder).get("tracker") or tracker)
+        before = str(seal.read_run(folder).get("tracker") or tracker)
     except InputError:
         return
     if Path(before).name != Path(tracker).name:
@@ -201,7 +190,7 @@ def check_place(folder: Path, tracker: str) -> None:
 def run_folders(sequences: list[Sequence], source: Path, out: Path) -> list[Path]:
     """Returns the folder for each sequence's run: `out` itself if the source is one sequence, else one below it.
     Raises InputError if `out` is a dataset."""
-    reject_dataset(out)
+    seal.reject_dataset(out)
     own = Path(sequences[0].source.get("path", source))
     if len(sequences) == 1 and (own == source or source.is_file() or own.is_file()):
         return [out]

@@ -110,3 +110,14 @@ def text(image: Image, words: str, at: tuple[float, float], size: float, ink: Co
     words = ascii_only(words)
     cv2.putText(image, words, place, cv2.FONT_HERSHEY_SIMPLEX, size, FLOOR, bold + 4, cv2.LINE_AA)
     cv2.putText(image, words, place, cv2.FONT_HERSHEY_SIMPLEX, size, ink, bold, cv2.LINE_AA)
+
+
+def draw_label(image: Image, words: str, at: tuple[float, float] | Array, size: float, ink: Colour) -> int:
+    """Writes light words on a rectangle, kept inside the image, in place, and returns its height in px."""
+    words = ascii_only(words)
+    (width, height), baseline = cv2.getTextSize(words, cv2.FONT_HERSHEY_SIMPLEX, size, 1)
+    x = int(np.clip(at[0], 0, max(image.shape[1] - width - 5, 0)))
+    y = int(np.clip(at[1], height + baseline + 2, image.shape[0] - 1))
+    cv2.rectangle(image, (x, y - height - baseline - 1), (x + width + 4, y), ink, -1)
+    cv2.putText(image, words, (x + 2, y - baseline), cv2.FONT_HERSHEY_SIMPLEX, size, FLOOR, 1, cv2.LINE_AA)
+    return height + baseline + 2

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import cv2
 import numpy as np
 
 from sim.types import Array, GroupEvent, Image
@@ -11,9 +10,9 @@ from tracking.drawing.canvas import (
     TRAIL_SECONDS,
     Canvas,
     Colour,
-    ascii_only,
     box_corners,
     colour,
+    draw_label,
     text,
     text_width,
 )
@@ -123,17 +122,6 @@ def _paint_group_id(canvas: Canvas, prefix: str, group: GroupMark, centre: Array
 def letter_size(canvas: Canvas) -> float:
     """Returns cv2's font scale that suits the canvas."""
     return float(np.clip(canvas.image.shape[1] / 1600, 0.42, 0.9))
-
-
-def draw_label(image: Image, words: str, at: tuple[float, float] | Array, size: float, ink: Colour) -> int:
-    """Writes light words on a rectangle, kept inside the image, in place, and returns its height in px."""
-    words = ascii_only(words)
-    (width, height), baseline = cv2.getTextSize(words, cv2.FONT_HERSHEY_SIMPLEX, size, 1)
-    x = int(np.clip(at[0], 0, max(image.shape[1] - width - 5, 0)))
-    y = int(np.clip(at[1], height + baseline + 2, image.shape[0] - 1))
-    cv2.rectangle(image, (x, y - height - baseline - 1), (x + width + 4, y), ink, -1)
-    cv2.putText(image, words, (x + 2, y - baseline), cv2.FONT_HERSHEY_SIMPLEX, size, FLOOR, 1, cv2.LINE_AA)
-    return height + baseline + 2
 
 
 def draw_captions(image: Image, layer: Layer, index: int, fps: float, size: float) -> None:

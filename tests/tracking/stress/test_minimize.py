@@ -20,7 +20,7 @@ from tests.processes import FAKE
 from tests.refusals import answer, refused
 from tracking.app.cli import run
 from tracking.app.commands.minimize import _of_run
-from tracking.app.commands.track import TrackerSetup
+from tracking.app.tracker_setup import TrackerSetup
 from tracking.errors import groups
 from tracking.errors.people import PersonKind
 from tracking.scoring.catalogue import ALL, Score

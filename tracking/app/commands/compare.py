@@ -27,7 +27,7 @@ from scenarios.limits import INTEGER, is_number
 from sim.store.atomic import write_file
 from sim.store.own_files import output_file
 from sim.store.tables import json_document, read_json
-from sim.types import Array, Bools
+from sim.types import Array
 from tracking.app.command_options import CompareOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.score_tables import checked_key, figure, table
@@ -54,8 +54,13 @@ def compare(options: CompareOptions) -> CommandResult:
         _check_score(key, keys[:place], options.tolerance)
     before, now = _read(options.baseline), _read(options.now)
     names, notes = list(before), _require_same(options, before, now)
-    first, second = _values(options.baseline, before, names, keys), _values(options.now, now, names, keys)
-    first[np.isnan(second) & _nothing_to_find(before, names, keys)] = np.nan
+    first, second = (
+        np.array([[_value(path, name, stored.get(name, {}), key) for key in keys] for name in names], float)
+        for path, stored in ((options.baseline, before), (options.now, now))
+    )
+    # The recall that belongs to a score is stated as unknown: the truth has nothing of its kind.
+    nothing_to_find = np.array([[before[name].get(_recall(key), 0) is None for key in keys] for name in names])
+    first[np.isnan(second) & nothing_to_find] = np.nan
     for key, values in zip(keys, first.T, strict=True):
         if np.isnan(values).all():
             known = [k for k in CATALOGUE if any(is_number(row.get(k)) for row in before.values())]
@@ -118,7 +123,7 @@ def _require_same(options: CompareOptions, before: Stored, now: Stored) -> list[
             if (key not in old and key not in own) or old.get(key) == own.get(key) == "":
                 unstated[key] = None
             elif key not in old or key not in own or _differ(old[key], own[key]):
-                got, expected = (_stated(row, key) for row in (own, old))
+                got, expected = (shortened(repr(row[key]), LISTED) if key in row else "nothing" for row in (own, old))
                 remedy = "track and score the same sequences in the same way, both with this version of flockscope"
                 expected = f"{expected}, as in {options.baseline}"
                 raise InputError(file=options.now, place=f"{name}: {key}", got=got, expected=expected, remedy=remedy)
@@ -127,14 +132,6 @@ def _require_same(options: CompareOptions, before: Stored, now: Stored) -> list[
 
 def _differ(one: Any, other: Any) -> bool:
     return bool(one != other) or isinstance(one, bool) != isinstance(other, bool)
-
-
-def _stated(row: Mapping[str, Any], key: str) -> str:
-    return shortened(repr(row[key]), LISTED) if key in row else "nothing"
-
-
-def _values(path: Path, stored: Stored, names: Sequence[str], keys: Sequence[str]) -> Array:
-    return np.array([[_value(path, name, stored.get(name, {}), key) for key in keys] for name in names], float)
 
 
 def _value(path: Path, name: str, row: Mapping[str, Any], key: str) -> float:
@@ -146,11 +143,6 @@ def _value(path: Path, name: str, row: Mapping[str, Any], key: str) -> float:
         remedy = "score the tracks again"
         raise InputError(file=path, place=f"{name}: {key}", got=got, expected=expected, remedy=remedy)
     return float(value)
-
-
-def _nothing_to_find(before: Stored, names: Sequence[str], keys: Sequence[str]) -> Bools:
-    """Returns where the recall that belongs to a score is stated as unknown, (S, K): the truth has none of its kind."""
-    return np.array([[before[name].get(_recall(key), 0) is None for key in keys] for name in names])
 
 
 def _recall(key: str) -> str:

@@ -9,7 +9,7 @@ import os
 import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from html import escape
 from itertools import zip_longest
@@ -20,10 +20,10 @@ from sim.store.own_files import GENERATOR, address, output_path
 from sim.types import DetectionMode, Sequence
 from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
 from tracking.app.score_ranking import COLUMNS, interval, rank_words, shown_columns, usual_key, verdict
 from tracking.app.score_tables import SIMILARITY, number, table
+from tracking.app.tracker_setup import TrackerSetup
 from tracking.comparison import ComparedRuns, compare
 from tracking.running import tracker_registry
 from tracking.running.run import TrackingRun
@@ -151,18 +151,16 @@ def _compiled_ahead() -> Iterator[Callable[[Iterable[_TrackJob]], Iterator[_Trac
     from sim.workers.pool import WorkerProcess
 
     # With one processor it would only take longer, as the process imports everything again.
-    worker, ahead = WorkerProcess(), QUICK_TRACKERS if (os.cpu_count() or 1) > 1 else ()
+    ahead = QUICK_TRACKERS if (os.cpu_count() or 1) > 1 else ()
 
     def compiled(jobs: Iterable[_TrackJob]) -> Iterator[_TrackJob]:
         for job in jobs:
             wait(compiling.get(job.tracker, ()))
             yield job
 
-    try:
+    with closing(WorkerProcess()) as worker:
         compiling = {tracker: [worker.submit(_compile, tracker)] for tracker in ahead}
         yield compiled
-    finally:
-        worker.close()
 
 
 def _compile(tracker: str) -> None:
@@ -209,13 +207,11 @@ def _replays(sequences: list[Sequence], runs: Runs, folder: Path) -> dict[str, l
     from tracking.app.replay_page.video import page_video
 
     videos = [page_video(one, output_path(folder, one.name, ".html"), "beside") for one in sequences]
-    return {
-        name: [
-            write_page(one, [Run(run)], folder / f"{name}-{one.name}.html", video)
-            for one, run, video in zip(sequences, found, videos, strict=True)
-        ]
-        for name, found in runs.items()
-    }
+    pages = {}
+    for name, found in runs.items():
+        each = zip(sequences, found, videos, strict=True)
+        pages[name] = [write_page(one, [Run(run)], folder / f"{name}-{one.name}.html", film) for one, run, film in each]
+    return pages
 
 
 def _ranking(compared: ComparedRuns, key: str) -> str:

@@ -19,9 +19,9 @@ from sim.store.own_files import output_file, refuse_foreign_file
 from sim.types import Sequence
 from tracking.app.command_options import MinimizeOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.track import TrackerSetup
 from tracking.app.progress import ProgressMeter
 from tracking.app.score_tables import number, table
+from tracking.app.tracker_setup import TrackerSetup
 from tracking.episodes.episode import streams_for
 from tracking.grouping.grouping_choice import default_grouping
 from tracking.grouping.link_rule import LinkRule

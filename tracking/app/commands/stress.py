@@ -102,7 +102,7 @@ def _data(sweep: Sweep, found: list[SearchedScene] | None) -> dict[str, Any]:
     if found is not None:
         seeds = len({scene.source.seed for scene in sweep.scenes.values()})
         return {**data, "seeds": seeds, "found": [_failure(failure, k) for k, failure in enumerate(worst(found), 1)]}
-    data["curves"] = {name: {**_means(sweep, name), "break": None} for name in names}
+    data["curves"] = {name: {**_ends(sweep.scores(name), plan.by), "break": None} for name in names}
     for name, best in sweep.oracles.items():
         of_share = zip(("mean", "low", "high"), map(plain, shares(sweep.scores(name), sweep.scores(best))), strict=True)
         data["curves"][name] |= {"oracle": best, "share": {**dict(of_share), "break": None}}
@@ -118,10 +118,6 @@ def _data(sweep: Sweep, found: list[SearchedScene] | None) -> dict[str, Any]:
     return data
 
 
-def _means(sweep: Sweep, name: str) -> dict[str, list[float | None]]:
-    return _ends(sweep.scores(name), sweep.plan.by)
-
-
 def _ends(scores: Array, by: str) -> dict[str, list[float | None]]:
     """Returns mean, ends of its 95 % interval, and number of scenes, for each column of scores (P, V)."""
     mean, low, high = (plain(CATALOGUE[by].within(end)) for end in mean_interval(scores))
@@ -130,20 +126,17 @@ def _ends(scores: Array, by: str) -> dict[str, list[float | None]]:
 
 def _matrix(sweep: Sweep, curves: Mapping[str, Any]) -> dict[str, Any]:
     first, second = ([*dict.fromkeys(values[k] for values in sweep.values)] for k in range(MOST_AXES))
-    wide = len(second)
-
-    def rows(flat: list[Any]) -> list[list[Any]]:
-        return [flat[k : k + wide] for k in range(0, len(flat), wide)]
-
-    frontiers = {}
+    frontiers, shape = {}, (len(first), len(second))
     for name in sweep.trackers:
         found = sweep.frontier(name)
         sides = [[SIDES[side] for side in row] for row in found.sides.tolist()]
         points = [_on_axis(sweep.plan.axes[1], point) for point in found.points]
         frontiers[name] = {"sides": sides, "mean_above": found.above.tolist(), "points": points}
     return {
-        "values": [first, second], "mean": {name: rows(curve["mean"]) for name, curve in curves.items()},
-        "share": {name: rows(curves[name]["share"]["mean"]) for name in sweep.trackers}, "frontier": frontiers,
+        "values": [first, second],
+        "mean": {name: np.reshape(curve["mean"], shape).tolist() for name, curve in curves.items()},
+        "share": {name: np.reshape(curves[name]["share"]["mean"], shape).tolist() for name in sweep.trackers},
+        "frontier": frontiers,
     }  # fmt: skip
 
 
@@ -151,11 +144,8 @@ def _by_scenario(sweep: Sweep, name: str) -> dict[str, dict[str, float | None]]:
     scores: dict[str, list[float]] = {}
     for scene in sweep.scenes.values():
         scores.setdefault(scene.source.name, []).append(sweep.score(name, scene))
-    return {scenario: _first(_ends(np.array([found]).T, sweep.plan.by)) for scenario, found in scores.items()}
-
-
-def _first(means: dict[str, Any]) -> dict[str, float | None]:
-    return {key: means[key][0] for key in ("mean", "low", "high", "scenes")}
+    ends = {scenario: _ends(np.array([found]).T, sweep.plan.by) for scenario, found in scores.items()}
+    return {scenario: {key: only for key, (only,) in found.items()} for scenario, found in ends.items()}
 
 
 def _on_axis(axis: Axis, point: BreakingPoint) -> dict[str, Any]:
@@ -213,11 +203,9 @@ def _curves(sweep: Sweep, data: dict[str, Any]) -> Iterator[str]:
         of_shares = {name: curves[name]["share"] for name in sweep.trackers}
         rows = [[name, *(_interval(curve, k) for curve in of_shares.values())] for k, name in enumerate(names)]
         yield table(f"share of the oracle, {title}", (), [axes[0], *of_shares], rows)
-    rows = []
-    for scenario in {} if axes else data["by_scenario"][sweep.oracle_names[0]]:
-        rows.append([scenario, *(_interval(of[scenario]) for of in data["by_scenario"].values())])
-    for k, name in enumerate(names):
-        rows.append([name, *(_interval(curve, k) for curve in curves.values())])
+    found = data["by_scenario"] or {}
+    rows = [[key, *(_interval(of[key]) for of in found.values())] for key in found.get(sweep.oracle_names[0], ())]
+    rows += [[name, *(_interval(curve, k) for curve in curves.values())] for k, name in enumerate(names)]
     yield table(title, (), [axes[0] if axes else "", *curves], rows)
     yield from _break_lines(sweep, data)
 

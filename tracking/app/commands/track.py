@@ -7,24 +7,24 @@ from __future__ import annotations
 
 import pickle
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import nullcontext
-from dataclasses import dataclass, field
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError, WorkError, counted, printable
-from sim.types import DetectionMode, Sequence
+from sim.types import Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import TrackOptions
 from tracking.app.command_result import CommandResult
-from tracking.app.commands.group import LASTING, groups_of, lasting
+from tracking.app.group_tables import LASTING, groups_of, lasting
 from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.app.stored_tracks import check_place, run_folders
+from tracking.app.tracker_setup import TrackerSetup
 from tracking.config import Config
-from tracking.grouping.grouping_choice import Grouping, grouping_of
+from tracking.grouping.grouping_choice import grouping_of
 from tracking.running.detection_mode import choose_mode
 from tracking.running.run import TrackingRun, input_summary
 from tracking.running.time_limit import TimeLimited
@@ -37,55 +37,31 @@ ROW_KEYS = (
 )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class TrackerSetup:
-    """A tracker with its parameters and inputs, as `tracking.track` takes them."""
-
-    tracker: str
-    config: Config | None = None
-    detections: DetectionMode | None = None
-    sensor: Mapping[str, Any] = field(default_factory=dict)
-    seed: int = 0
-    grouping: Grouping | None = None
-    limited: TimeLimited | None = None  # the tracker with a limit of time for each step
-
-    def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> TrackingRun:
-        """Tracks the sequence and returns its tracks, with groups and events. Nothing is written."""
-        from tracking.running.run import track
-
-        return track(
-            self.limited or self.tracker, sequence, params=self.config, detections=self.detections,
-            sensor=self.sensor, seed=self.seed, grouping=self.grouping, progress=progress,
-        )  # fmt: skip
-
-
 def track(options: TrackOptions) -> CommandResult:
     """Tracks every sequence of the source and stores the tracks; returns a line for each run."""
     from sim.store.atomic import lock_folder
 
     setup = _setup(options)
-    needs = find(setup.tracker).needs
-    pictures = setup.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(needs)
+    pictures = setup.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(find(setup.tracker).needs)
     source = source_of(options, options.source, pictures)
     sequences = source.open()
     folders = run_folders(sequences, options.source, options.out)
+    rows = list[dict[str, Any]]()
     with lock_folder(options.out):
         for folder in folders:
             check_place(folder, setup.tracker)
-        _check_modes(setup, needs, sequences, options.background)
+        _check_modes(setup, sequences, options.background)
         if min(options.workers, len(sequences)) > 1:
             given = pickle.dumps(options)  # a tracker class and its config cannot be pickled, their names can
             jobs = [(given, folder) for folder in folders]
             try:
-                rows = list(over_sequences("track", _track_in_worker, sequences, jobs, source, options.workers))
+                rows += list(over_sequences("track", _track_in_worker, sequences, jobs, source, options.workers))
             except WorkError as error:  # a process that has ended names no tracker
                 raise (error if error.file else error.replaced(file=setup.tracker)) from error.__cause__
         else:
             with setup.limited or nullcontext(), ProgressMeter("track", total_frames(sequences)) as meter:
-                rows = [
-                    _track_sequence(setup, sequence, folder, partial(_step, meter, sequence.name))
-                    for sequence, folder in zip(sequences, folders, strict=True)
-                ]
+                for sequence, folder in zip(sequences, folders, strict=True):
+                    rows.append(_track_sequence(setup, sequence, folder, partial(_step, meter, sequence.name)))
     return CommandResult({"tracker": setup.tracker, "runs": rows}, "\n".join(map(_line, rows)))
 
 
@@ -141,10 +117,8 @@ def _config(tracker: str, params: str | None, settings: list[str]) -> Config | N
     raise InputError(place=place, got=tracker, expected="a tracker with parameters", remedy=remedy)
 
 
-def _check_modes(
-    setup: TrackerSetup, needs: tuple[str, ...], sequences: list[Sequence], background: str | None
-) -> None:
-    modes = [choose_mode(needs, sequence, setup.detections) for sequence in sequences]
+def _check_modes(setup: TrackerSetup, sequences: list[Sequence], background: str | None) -> None:
+    modes = [choose_mode(find(setup.tracker).needs, sequence, setup.detections) for sequence in sequences]
     if background is not None and "image" not in modes:
         got, expected = f"--detections {modes[0]}", "a tracker that works on pictures"
         raise InputError(place="--background", got=got, expected=expected, remedy="leave --background out")

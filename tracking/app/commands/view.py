@@ -15,7 +15,7 @@ from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.score_tables import checked_key
 from tracking.app.scored_sequence import read_runs, run_names, scale_of_texts, scoring_jobs
-from tracking.app.sequence_workers import source_of
+from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.app.stored_tracks import find_tracks, match_tracks
 
 if TYPE_CHECKING:
@@ -27,6 +27,7 @@ INDEX = "index.html"  # the report in the folder of the pages
 Step = Callable[[str], None]  # Reports that one picture of the named sequence is done.
 
 Write = Callable[[Sequence, Path, Step], None]  # Writes the file of one sequence.
+Draw = Callable[[Sequence, "TrackingRun | None", Path, Step], None]  # The same, with the tracks to draw.
 
 
 def view(options: ViewOptions) -> CommandResult:
@@ -62,14 +63,13 @@ def _pages(
     from tracking.app.report.moments import shown_errors
 
     words = [*names] if len(names) > 1 else [""] * len(names)
-    jobs = dict(
-        zip((s.name for s in sequences), scoring_jobs(names.values(), sequences, options.box_scale), strict=True)
-    )
+    given = scoring_jobs(names.values(), sequences, options.box_scale)
+    jobs = {sequence.name: job for sequence, job in zip(sequences, given, strict=True)}
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
-        given = read_runs(sequence, jobs[sequence.name])
-        errors = [known.get(sequence.name) or shown_errors(sequence, run) for run in given]
-        shown = [Run(run, own.errors, word) for word, run, own in zip(words, given, errors, strict=True)]
+        runs = read_runs(sequence, jobs[sequence.name])
+        errors = [known.get(sequence.name) or shown_errors(sequence, run) for run in runs]
+        shown = [Run(run, own.errors, word) for word, run, own in zip(words, runs, errors, strict=True)]
         write_page(sequence, shown, path, page_video(sequence, path, options.video, step))
 
     return _write_each("view", sequences, options.out, ".html", write, by_picture=options.video != "none")
@@ -77,20 +77,20 @@ def _pages(
 
 def _report(options: ViewOptions, sequences: list[Sequence], names: Mapping[str, str]) -> CommandResult:
     """Writes index.html, the report on all runs; for one run it links to the pages of the sequences."""
-    from tracking.app.report.of_runs import judged_runs, report_of_runs
+    from tracking.app.report.of_runs import judge, report_of_runs
     from tracking.app.report.page import check_packages, write_report
 
     check_packages()
     refuse_foreign_file(options.out / INDEX)
     index, pages = options.out / INDEX, CommandResult({"files": []})
     source = source_of(options, options.source, without="box_scale")
-    found = judged_runs(names, sequences, source, options.workers, options.box_scale)
+    jobs = scoring_jobs(names.values(), sequences, options.box_scale, oracles=True)
+    found = list(over_sequences("report", judge, sequences, jobs, source, options.workers))
     if len(names) == 1:
         known = {sequence.name: one.errors[0] for sequence, one in zip(sequences, found, strict=True)}
         pages = _pages(options, sequences, names, known)
-    files = {
-        sequence.name: address(Path(path.name)) for sequence, path in zip(sequences, pages.data["files"], strict=False)
-    }
+    addresses = [address(Path(path.name)) for path in pages.data["files"]]
+    files = dict(zip((sequence.name for sequence in sequences), addresses, strict=False))
     write_report(report_of_runs([*names], sequences, found, options.by, files), index)
     return CommandResult({"files": [index, *pages.data["files"]]}, f"{index}\n{pages.text}".rstrip())
 
@@ -99,39 +99,35 @@ def sheet(options: SheetOptions) -> CommandResult:
     """Writes a contact sheet, several frames in one PNG, for each sequence. The result's data: "files", their paths."""
     from tracking.app.pictures.contact_sheet import write_sheet
 
-    sequences = source_of(options, options.source, images=True, without="box_scale").open()
-    read = _reader(sequences, options.tracks, options.box_scale)
+    def draw(sequence: Sequence, tracks: TrackingRun | None, path: Path, _: Step) -> None:
+        write_sheet(sequence, path, options.frames, tracks)
 
-    def write(sequence: Sequence, path: Path, _: Step) -> None:
-        write_sheet(sequence, path, options.frames, read(sequence))
-
-    return _write_each("sheet", sequences, options.out, ".png", write, by_picture=False)
+    return _drawn("sheet", options, ".png", draw, by_picture=False)
 
 
 def overlay(options: OverlayOptions) -> CommandResult:
     """Writes a video for each sequence with tracks, truth or both drawn over its pictures."""
     from tracking.app.pictures.overlay import write_overlay
 
+    def draw(sequence: Sequence, tracks: TrackingRun | None, path: Path, step: Step) -> None:
+        write_overlay(sequence, tracks, path, options.truth, step)
+
+    return _drawn("overlay", options, ".mp4", draw)
+
+
+def _drawn(
+    what: str, options: SheetOptions | OverlayOptions, suffix: str, draw: Draw, by_picture: bool = True
+) -> CommandResult:
+    """Draws each sequence with its tracks, without any if the options name none."""
     sequences = source_of(options, options.source, images=True, without="box_scale").open()
-    read = _reader(sequences, options.tracks, options.box_scale)
+    found = [] if options.tracks is None else match_tracks(sequences, find_tracks(options.tracks))
+    stored = {sequence.name: tracks for sequence, tracks in found}
+    factors = scale_of_texts(stored.values(), options.box_scale)
 
     def write(sequence: Sequence, path: Path, step: Step) -> None:
-        write_overlay(sequence, read(sequence), path, options.truth, step)
+        draw(sequence, stored[sequence.name].read(sequence, factors) if stored else None, path, step)
 
-    return _write_each("overlay", sequences, options.out, ".mp4", write)
-
-
-def _reader(
-    sequences: list[Sequence], tracks: Path | None, box_scale: str | None
-) -> Callable[[Sequence], TrackingRun | None]:
-    """Returns a function that reads the tracks of a sequence; None without tracks. box_scale: that of their texts."""
-    stored = {} if tracks is None else {s.name: found for s, found in match_tracks(sequences, find_tracks(tracks))}
-    factors = scale_of_texts(stored.values(), box_scale)
-
-    def read(sequence: Sequence) -> TrackingRun | None:
-        return stored[sequence.name].read(sequence, factors) if stored else None
-
-    return read
+    return _write_each(what, sequences, options.out, suffix, write, by_picture)
 
 
 def _write_each(

@@ -18,8 +18,8 @@ from sim.store.atomic import new_file
 from sim.store.own_files import GENERATOR
 from sim.types import Frame, Image, Sequence, Tracks
 from tracking.app.replay_page.video import even_size, refuse_source, shown_pictures
-from tracking.drawing.canvas import FLOOR, Canvas, colour, text
-from tracking.drawing.layer_painting import ALARM, draw_captions, draw_label, letter_size, paint_layer
+from tracking.drawing.canvas import FLOOR, Canvas, colour, draw_label, text
+from tracking.drawing.layer_painting import ALARM, draw_captions, letter_size, paint_layer
 from tracking.drawing.layers import Layer, layer_of_tracks, layer_of_truth
 from tracking.running.run import grouped
 

@@ -111,6 +111,8 @@ def page_data(sequence: Sequence, runs: SequenceOf[Run], span: tuple[int, int] |
     detections = _detections(sequence, low, high)
     both = [rows for rows, _ in sides.values()]
     length = _length(sequence, both, detections)
+    on_ground = [points for rows in both if rows.plane == "ground" for points in _points(rows)]
+    area = plan_area(sequence.scene, np.concatenate([np.zeros((0, 2)), *on_ground]))
     return {
         "name": sequence.name,
         "tracker": runs[0].tracker if runs else UNNAMED,
@@ -121,7 +123,7 @@ def page_data(sequence: Sequence, runs: SequenceOf[Run], span: tuple[int, int] |
         "start": start,
         "zoomed": span is not None,
         "image": sequence.image_size or _image_size(both),
-        "bounds": _bounds(sequence, both),
+        "bounds": None if area is None else np.concatenate(area).round(2).tolist(),
         "scene": plain(sequence.scene),
         "camera": plain(sequence.camera),
         "truth": encoded.get("truth"),
@@ -156,12 +158,6 @@ def _image_size(both: list[PageRows]) -> list[int] | None:
         return None
     width, height = known.max(axis=0)
     return [max(math.ceil(width), 16), max(math.ceil(height), 16)]
-
-
-def _bounds(sequence: Sequence, both: list[PageRows]) -> list[float] | None:
-    points = [part for rows in both if rows.plane == "ground" for part in _points(rows)]
-    area = plan_area(sequence.scene, np.concatenate([np.zeros((0, 2)), *points]))
-    return None if area is None else np.concatenate(area).round(2).tolist()
 
 
 def _points(rows: PageRows) -> list[Array]:

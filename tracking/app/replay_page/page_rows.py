@@ -116,10 +116,8 @@ class PageRows:
 
     def ordered(self, rows: Ints) -> PageRows:
         """Returns the rows with the indices `rows`, in this order."""
-        names = [field.name for field in fields(self) if field.name != "plane"]
-        columns: dict[str, Any] = {name: getattr(self, name) for name in names if getattr(self, name) is not None}
-        cut: dict[str, Any] = {name: column[rows] for name, column in columns.items()}
-        return replace(self, **cut)
+        columns = {field.name: getattr(self, field.name) for field in fields(self) if field.name != "plane"}
+        return replace(self, **{name: column[rows] for name, column in columns.items() if column is not None})
 
 
 def rows_of_truth(truth: Truth) -> PageRows:
@@ -203,7 +201,7 @@ def _encoded_wholes(rows: PageRows, scale: int) -> Json | None:
         "size": deltas(rows.size * 10),
         "speed": deltas(rows.speed * SPEED_SCALE[rows.plane]),
         "ellipse": [deltas(axes[:, 0] * scale), deltas(axes[:, 1] * scale), deltas(np.degrees(axes[:, 2]))],
-        "hull": [_steps(np.rint(hull * scale).astype(np.int64)) for hull in hulls],
+        "hull": [deltas(hull * scale) for hull in hulls],
     }
 
 
@@ -227,16 +225,11 @@ def simplified(hull: Array, least: float) -> Array:
     return hull if len(hull) <= MAX_CORNERS else hull[:: math.ceil(len(hull) / MAX_CORNERS)]
 
 
-def _steps(corners: Ints) -> list[int]:
-    listed: list[int] = np.diff(corners, axis=0, prepend=np.zeros((1, 2), np.int64)).ravel().tolist()
-    return listed
-
-
 def deltas(column: NDArray[np.float64]) -> list[int]:
     """Returns the column (N,), rounded to whole numbers, as its first value and the differences between neighbours; nan
-    and infinity count as -99999."""
+    and infinity count as -99999. Two columns (N, 2) are interleaved."""
     whole = np.where(np.isfinite(column), np.rint(column), NIL).astype(np.int64)
-    listed: list[int] = np.diff(whole, prepend=0).tolist()
+    listed: list[int] = np.diff(whole, axis=0, prepend=0).ravel().tolist()
     return listed
 
 

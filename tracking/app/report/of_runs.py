@@ -14,8 +14,7 @@ from tracking.app.report.content import Played, Report, heat_map
 from tracking.app.report.moments import COSTS, cause_rows, moments, shown_errors
 from tracking.app.score_ranking import RankedRuns, rank_words, ranked_runs, verdict
 from tracking.app.score_tables import SIMILARITY
-from tracking.app.scored_sequence import ScoringJob, read_runs, score_runs, scoring_jobs
-from tracking.app.sequence_workers import OpenedAs, over_sequences
+from tracking.app.scored_sequence import ScoringJob, read_runs, score_runs
 from tracking.comparison import ComparedSequence
 from tracking.errors.found import RunErrors
 
@@ -29,13 +28,11 @@ class JudgedRuns:
     errors: list[RunErrors]  # of each run
 
 
-def judged_runs(
-    names: Mapping[str, str], sequences: list[Sequence], source: OpenedAs, workers: int, box_scale: str | None = None
-) -> list[JudgedRuns]:
-    """Returns for each sequence the scores and errors of all runs. names: by the run's name, the text of the command
-    line that names stored tracks or a tracker class. box_scale: the text of --box-scale."""
-    jobs = scoring_jobs(names.values(), sequences, box_scale, oracles=True)
-    return list(over_sequences("report", _judge, sequences, jobs, source, workers))
+def judge(sequence: Sequence, job: ScoringJob) -> JudgedRuns:
+    """Returns the scores and errors of all runs of a job on the sequence."""
+    runs = read_runs(sequence, job)
+    errors = [shown_errors(sequence, run, COSTS, causes=True) for run in runs]
+    return JudgedRuns(job, score_runs(sequence, runs, job), errors)
 
 
 def report_of_runs(
@@ -73,12 +70,6 @@ def report_of_runs(
             for one in sorted(played, key=lambda one: one.score) if one.sequence in files and not one.why
         ],
     )  # fmt: skip
-
-
-def _judge(sequence: Sequence, job: ScoringJob) -> JudgedRuns:
-    runs = read_runs(sequence, job)
-    errors = [shown_errors(sequence, run, COSTS, causes=True) for run in runs]
-    return JudgedRuns(job, score_runs(sequence, runs, job), errors)
 
 
 def _played(ranked: RankedRuns) -> Iterator[Played]:

@@ -33,6 +33,7 @@ def report_of_sweep(sweep: Sweep, data: Json, words: SequenceOf[str]) -> Report:
     """Returns the report on a sweep. data: the content of stress.json; words: sentences on the breaking points."""
     plan, searched = sweep.plan, data["found"] is not None
     scenes = [*sweep.scenes.values()]
+    where = "at the easy end of the axes" if plan.axes else "as they are"
     easy = scenes if searched or not plan.axes else [s for s in scenes if s.values == sweep.values[0]]
     entries = {entry.name: entry for name in plan.scenarios for entry in rows(name)}
     played = {one: scene for scene in scenes for one in _played(sweep, scene, entries)}
@@ -42,7 +43,8 @@ def report_of_sweep(sweep: Sweep, data: Json, words: SequenceOf[str]) -> Report:
     shown = moments([*played], lambda one, rival: _replay(sweep, (one.name, rival), played[one], errors))
     return Report(
         title=f"Stress of {', '.join(sweep.trackers)}", about=_about(sweep, data), by=plan.by,
-        ranking=[] if searched else list(_ranking(sweep, easy)), ranking_words=_ranking_words(sweep, easy),
+        ranking=[] if searched else list(_ranking(sweep, easy)),
+        ranking_words=[f"{counted(len(easy), 'scene')}, {where}. Trackers with a common rank: no sure difference."],
         heat=heat_map(f"{plan.by} by scenario", easiest),
         curves=_curves(sweep, data, words),
         matrix_words=words if data["matrix"] else [],
@@ -75,11 +77,6 @@ def _ranking(sweep: Sweep, scenes: SequenceOf[Scene]) -> Iterator[Json]:
     for k, name in enumerate([*oracles, *(names[k] for k in found.order.tolist())]):
         means = {key: mean_of_finite(_values(sweep, name, scenes, key)) for key in CATALOGUE}
         yield {"run": name, "rank": words[k], "mean": mean[k], "low": low[k], "high": high[k], **means}
-
-
-def _ranking_words(sweep: Sweep, scenes: SequenceOf[Scene]) -> list[str]:
-    where = "at the easy end of the axes" if sweep.plan.axes else "as they are"
-    return [f"{counted(len(scenes), 'scene')}, {where}. Trackers with a common rank: no sure difference."]
 
 
 def _curves(sweep: Sweep, data: Json, words: SequenceOf[str]) -> Curves | None:

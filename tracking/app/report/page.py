@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import re
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from scenarios.errors import InputError
 from sim.store.atomic import write_file
@@ -14,9 +13,6 @@ from tracking.app.replay_page.page import page_html, script_json, theme
 from tracking.app.report.content import Report
 from tracking.app.score_tables import number
 from tracking.scoring.catalogue import CATALOGUE
-
-if TYPE_CHECKING:
-    from jinja2 import Environment
 
 HERE = Path(__file__).parent
 KEYS = ("HOTA", "MOTA", "IDF1", "group_F1", "pairwise_F1", "event_F1")  # scores beside the one that ranks
@@ -45,6 +41,7 @@ def write_report(report: Report, path: Path) -> None:
 
 def report_html(report: Report) -> str:
     """Returns the report as HTML."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
     from tracking.app.report.charts import cause_parts, charts, scripts
@@ -53,7 +50,10 @@ def report_html(report: Report) -> str:
     known = {key for row in report.ranking for key in KEYS if math.isfinite(row.get(key, math.nan))}
     keys = [key for key in KEYS if key != report.by and key in known]
     replay = page_html("Replay", "@@DATA@@").replace("</script", "<\\/script")
-    found = _environment().get_template("report.html").render(
+    pages = Environment(loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined)
+    pages.globals["nan"] = math.nan
+    pages.filters |= {"score": lambda value: number("HOTA", value), "breaking": _breaking}
+    found = pages.get_template("report.html").render(
         report=report, parts=drawn, generator=GENERATOR, ranking_keys=keys,
         meanings={key: score.meaning for key, score in CATALOGUE.items()},
         style=Markup(theme() + (HERE / "report.css").read_text(encoding="utf-8")),
@@ -70,13 +70,3 @@ def _breaking(text: str) -> str:
     from markupsafe import Markup, escape
 
     return Markup(re.sub(r"(&[#\w]+;|[/._:=-])(?=\S)", r"\1<wbr>", str(escape(text))))
-
-
-def _environment() -> Environment:
-    from jinja2 import Environment, FileSystemLoader, StrictUndefined
-
-    made = Environment(loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined)
-    made.globals["nan"] = math.nan
-    made.filters["score"] = lambda value: number("HOTA", value)
-    made.filters["breaking"] = _breaking
-    return made

@@ -23,7 +23,7 @@ from tests.sealing import seal_again
 from tests.short_scene import write_short_scene
 from tracking import group
 from tracking.app.cli import run
-from tracking.app.commands.group import lasting
+from tracking.app.group_tables import lasting
 from tracking.recordings.source import open_source
 from tracking.recordings.track_texts import read_tracks
 

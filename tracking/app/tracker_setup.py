@@ -1,0 +1,35 @@
+"""A tracker with its parameters and inputs, as a command runs it on sequences."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from sim.types import DetectionMode, Sequence
+from tracking.config import Config
+from tracking.grouping.grouping_choice import Grouping
+from tracking.running.run import TrackingRun
+from tracking.running.time_limit import TimeLimited
+
+
+@dataclass(frozen=True)
+class TrackerSetup:
+    """A tracker with its parameters and inputs, as `tracking.track` takes them."""
+
+    tracker: str
+    config: Config | None = None
+    detections: DetectionMode | None = None
+    sensor: Mapping[str, Any] = field(default_factory=dict)
+    seed: int = 0
+    grouping: Grouping | None = None
+    limited: TimeLimited | None = None  # the tracker with a limit of time for each step
+
+    def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> TrackingRun:
+        """Tracks the sequence and returns its tracks, with groups and events. Nothing is written."""
+        from tracking.running.run import track
+
+        return track(
+            self.limited or self.tracker, sequence, params=self.config, detections=self.detections,
+            sensor=self.sensor, seed=self.seed, grouping=self.grouping, progress=progress,
+        )  # fmt: skip
