@@ -27,7 +27,6 @@ import numpy as np
 import optuna
 from filelock import FileLock, Timeout
 from optuna.exceptions import UpdateFinishedTrialError
-from optuna.samplers import RandomSampler
 from optuna.storages import JournalStorage, get_storage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
@@ -39,7 +38,7 @@ from tracking.running.used_files import UsedFiles, changes, relative
 from tracking.stats import mean_of_known
 from tracking.tuning.candidates import STORED, TrialRecord
 from tracking.tuning.options import Progress
-from tracking.tuning.sampler import PRUNED, distribution, next_params, should_prune
+from tracking.tuning.sampler import PRUNED, distribution, propose, should_prune, tpe_sampler
 from tracking.tuning.search_plan import SearchPlan
 
 SQLITE = re.compile(r"sqlite(?:\+\w+)?:///(?!:memory:)([^?]+)(?:\?.*)?")  # URL of a file, which gets locks, too
@@ -159,14 +158,18 @@ class SearchStudy:
             begun = [t for t in trials if t.state in (*FINISHED, TrialState.RUNNING)]
             for t in begun:
                 if t.state == TrialState.RUNNING and (take_running or self.locks.take_trial(t.number)):
+                    self.optuna.sampler = tpe_sampler(self.plan, t.number)
                     trial = optuna.Trial(self.optuna, t._trial_id)
                     for name, choices in self._space.items():  # the process may have ended before it had chosen all
+                        # What was drawn alone is drawn again, so that the generator continues from there.
+                        if name in t.params and name not in trial.relative_params:
+                            self.optuna.sampler.sample_independent(self.optuna, t, name, choices)
                         trial._suggest(name, choices)
                     return trial
             if len(begun) >= self.plan.options.trials:
                 return None
             if not any(t.state == TrialState.WAITING for t in trials):
-                self.optuna.enqueue_trial(next_params(self.plan, self.optuna, len(trials)))
+                propose(self.plan, self.optuna, len(trials))
             trial = self.optuna.ask(self._space)
             self.locks.take_trial(trial.number)
             return trial
@@ -221,7 +224,7 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
                     with suppress(KeyError):  # there is no such study
                         optuna.delete_study(study_name=name, storage=place)
                 study = optuna.create_study(
-                    storage=place, study_name=name, load_if_exists=True, sampler=RandomSampler(),  # draws nothing
+                    storage=place, study_name=name, load_if_exists=True,
                     directions=["maximize" if goal.higher else "minimize" for goal in plan.goals],
                 )  # fmt: skip
         except OSError:
