@@ -31,6 +31,7 @@ lint: $(ENVIRONMENT)
 
 types: $(ENVIRONMENT)
 	$(BIN)/mypy
+	$(BIN)/python -m benchmarks snippets
 
 docs: $(DOCS)
 	$(BIN)/sphinx-build -q -W --keep-going -E -b html -d build/doctrees docs build/docs

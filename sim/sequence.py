@@ -21,7 +21,7 @@ from sim.truth.order_fulfilment import check_orders
 # isort: off
 # fmt: off
 from sim.types import (
-    BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Frame, Image, Ints, Motion, PixelTruth, Sequence, Truth,
+    BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Frame, FrameTruth, Image, Ints, Motion, PixelTruth, Sequence, Truth,
 )
 # fmt: on
 # isort: on
@@ -31,9 +31,26 @@ if TYPE_CHECKING:
     from sim.render.renderer import RenderedFrame, Renderer
 
 
+class LabelledSequence(Sequence):
+    """A sequence that is known to have a truth, as simulated ones do."""
+
+    @property
+    def truth(self) -> Truth:
+        """The truth, computed on first use and then kept."""
+        found = super().truth
+        assert found is not None
+        return found
+
+    def frame_truth(self, index: int) -> FrameTruth:
+        """Returns the truth of frame `index` (from 1); its `pixels` are given if the sequence has `load_pixels`."""
+        found = super().frame_truth(index)
+        assert found is not None
+        return found
+
+
 def simulate(
     scenario: Scenario, seed: int, repeat: int = 0, streams: Iterable[str] = ("left",), stride: int = 1
-) -> Sequence:
+) -> LabelledSequence:
     """Returns the sequence that a scenario and a seed define: frames, detections of its sensor, and truth.
 
     The motion is simulated at once; detections, truth and pictures are computed when they are first used.
@@ -64,7 +81,7 @@ def simulate(
 def observe(
     scenario: Scenario | ObservationSpec, motion: Motion, *, people: Mapping[str, tuple[int, ...]] | None = None,
     check: bool = True, streams: Iterable[str] = (), stride: int = 1,
-) -> Sequence:  # fmt: skip
+) -> LabelledSequence:  # fmt: skip
     """Returns the sequence in which the camera and sensor of `scenario` observe the given motion.
 
     people: person ids of each group that `sensor.hide` may name, by the group's name; None: the groups of `scenario`,
@@ -144,7 +161,7 @@ def observe(
     source = {"kind": "simulated", "seed": motion.seed, "repeat": motion.repeat}
     source |= {} if stride == 1 else {"stride": stride}
     source |= {} if renderer is None else {"background": OWN_BACKGROUND}
-    return Sequence(
+    return LabelledSequence(
         name=motion.name, fps=kept.fps, length=len(kept.present), frames=bare if renderer is None else frames,
         load_truth=truth, image_size=camera.image, camera=camera, scene=motion.scene,
         px_per_m=px_per_m_at_centre(camera), has_images=left, has_right=right, has_detections=True,

@@ -480,12 +480,16 @@ class Tracker(Protocol):
     """The interface of a tracker. needs: one or more of "pixels" (pictures), "stereo" (left and right pictures),
     "boxes" and "points" (detections). The tracker can work with each of these inputs alone."""
 
-    needs: tuple[str, ...]
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The inputs, usually an attribute of the class."""
+        ...
 
     def reset(self, context: Context, seed: int) -> None:
         """Forgets all state and prepares for a new sequence. seed: for the tracker's random numbers."""
 
-    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+    # Any: a tracker that needs detections always gets them, and may say so.
+    def step(self, frame: Frame, detections: Any) -> Tracks:
         """Returns this tracker's tracks of `frame`, from this and earlier frames only. detections: those of the frame,
-        possibly with zero rows; None if the tracker is given pictures only."""
+        possibly with zero rows (Detections); None if the tracker is given pictures only."""
         ...

@@ -21,6 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
+from scenarios.errors import InputError
 from sim.types import Array, Bools, Tracks, Truth
 from tracking.grouping.foot_points import source_of
 from tracking.grouping.grouped_tracks import with_groups
@@ -171,7 +172,7 @@ class MatchedSides:
 
 
 def evaluate(
-    truth: Truth,
+    truth: Truth | None,
     tracks: Iterable[Tracks],
     *,
     similarity: Similarity | None = None,
@@ -181,7 +182,7 @@ def evaluate(
     """Returns every score of the catalogue (docs/reference/metrics.md) for one tracker.
 
     Args:
-        truth: the labels of a sequence. If they are clearly sparse, only annotated frames are scored.
+        truth: the labels of a sequence, `sequence.truth`. If they are clearly sparse, only annotated frames are scored.
         tracks: the tracker's `Tracks`, one per frame, in any order. A frame without `Tracks` counts as a frame without
             tracked people. If the tracks have no groups, groups and events are derived by the default grouping; in the
             image, this needs a known `truth.px_per_m`.
@@ -199,8 +200,10 @@ def evaluate(
     Raises:
         IncomparableError: boxes or positions to be compared are missing.
         ValueError: an id occurs twice in one frame.
-        InputError: groups must be derived in the image and `truth.px_per_m` is 0 or less.
+        InputError: `truth` is None, or groups must be derived in the image and `truth.px_per_m` is 0 or less.
     """
+    if truth is None:
+        raise InputError(place="truth", got="None", expected="labels", remedy="evaluate a sequence that has a truth")
     (compared,) = Scorer(truth).compare([tracks], similarity, frames)
     return compared.scores(group_match)
 

@@ -1,0 +1,40 @@
+"""Type check of the Python that README and docs show: python -m benchmarks snippets
+
+Writes each block of Python into a file of its own, named as the sentence above says ("Save this as `name.py`") or after
+its page, and runs mypy on them with the settings of pyproject.toml. Exit code 1 if it finds errors.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+BLOCK = re.compile(r"(?:Save this as `(?P<name>\w+\.py)`[^`]*(?:`\w+`[^`]*)*?\n+)?^```python\n(?P<code>.*?)^```", re.M | re.S)
+
+
+def snippets() -> dict[str, str]:
+    """Returns the code of every block by the name of its file."""
+    found = {}
+    for page in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))):
+        for k, block in enumerate(BLOCK.finditer(page.read_text(encoding="utf-8"))):
+            found[block["name"] or f"{page.stem.replace('-', '_').lower()}_{k}.py"] = block["code"]
+    return found
+
+
+def main() -> None:
+    """Runs mypy on all blocks."""
+    with tempfile.TemporaryDirectory() as folder:
+        for name, code in snippets().items():
+            (Path(folder) / name).write_text(code, encoding="utf-8")
+        options = ["--config-file", "pyproject.toml", *map(str, sorted(Path(folder).glob("*.py")))]
+        environment = {**os.environ, "MYPYPATH": folder}
+        sys.exit(subprocess.run([sys.executable, "-m", "mypy", *options], cwd=ROOT, env=environment).returncode)
+
+
+if __name__ == "__main__":
+    main()
