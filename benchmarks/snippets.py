@@ -14,7 +14,8 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-BLOCK = re.compile(r"(?:Save this as `(?P<name>\w+\.py)`[^`]*(?:`\w+`[^`]*)*?\n+)?^```python\n(?P<code>.*?)^```", re.M | re.S)
+NAMED = r"(?:Save this as `(?P<name>\w+\.py)`[^`]*(?:`\w+`[^`]*)*?\n+)?"
+BLOCK = re.compile(NAMED + r"^```python\n(?P<code>.*?)^```", re.M | re.S)
 
 
 def snippets() -> dict[str, str]:
