@@ -77,7 +77,7 @@ def _layers(sequence: Sequence, tracks: SequenceOf[Tracks] | None, with_truth: b
 def overlay_pictures(sequence: Sequence, layers: SequenceOf[Layer]) -> Iterator[Image]:
     """Yields the video's pictures, BGR uint8, one per frame, of even width and height."""
     for frame, picture in shown_pictures(sequence):
-        body = _drawn(picture, sequence.fps, frame.index, layers)
+        body = drawn(picture, sequence.fps, frame.index, layers)
         banner = np.full((BANNER_HEIGHT, body.shape[1], 3), FLOOR, np.uint8)
         text(banner, banner_words(sequence, frame, layers), (6, BANNER_HEIGHT / 2 + 5), LETTERS)
         if frame.image is None:
@@ -85,7 +85,7 @@ def overlay_pictures(sequence: Sequence, layers: SequenceOf[Layer]) -> Iterator[
         yield even_size(np.concatenate([banner, body]))
 
 
-def _drawn(picture: Image, fps: float, index: int, layers: SequenceOf[Layer]) -> Image:
+def drawn(picture: Image, fps: float, index: int, layers: SequenceOf[Layer]) -> Image:
     factor = 2 if len(picture) < LOW else 1
     image = np.array(cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_LINEAR), np.uint8)
     size = np.array(picture.shape[1::-1], float)

@@ -1,0 +1,123 @@
+"""The sentences of README that have figures, made from the stored tables: python -m benchmarks headline [--write]
+
+Prints them, or writes them into README.md between `<!-- headline: NAME -->` and `<!-- end -->`. A test compares.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from benchmarks.support.options import new_parser
+
+ROOT = Path(__file__).resolve().parents[1]
+README, RESULTS = ROOT / "README.md", ROOT / "docs" / "results"
+BLOCK = re.compile(r"(<!-- headline: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+RECORDINGS = {"PETS09-S2L1": "PETS", "TUD-Campus": "TUD", "AVG-TownCentre": "TownCentre"}
+
+
+def stored(table: str, title: str = "") -> dict[str, Any]:
+    """Returns the stored table whose title begins so: its title, columns and rows of cells."""
+    tables = json.loads((RESULTS / f"{table}.json").read_text(encoding="utf-8"))["tables"]
+    return next(t for t in tables if t["title"].startswith(title))
+
+
+def rows(table: str, title: str = "") -> list[dict[str, str]]:
+    """Returns the rows of that table by column."""
+    found = stored(table, title)
+    return [dict(zip(found["columns"], cells, strict=True)) for cells in found["rows"]]
+
+
+def number(cell: str, digits: int = 2) -> str:
+    """Returns the first number of a cell, rounded."""
+    found = re.search(r"[-+]?\d+(\.\d+)?", cell)
+    assert found is not None, cell
+    return f"{float(found[0]):.{digits}f}"
+
+
+def signed(cell: str) -> str:
+    """Returns the first number of a cell with its sign, and the star if it has one."""
+    return f"{float(number(cell, 3)):+.2f}{' *' * cell.endswith('*')}".replace("-", "−")
+
+
+def peers() -> str:
+    """`blob` beside trackers of individuals, on simulated and on real boxes."""
+    parts = []
+    for title in ("Scenes with occlusion", *RECORDINGS):
+        ours, *others = rows("peers", title)
+        others = [row for row in others if not row["tracker"].startswith("`blob`")]
+        best = max(others, key=lambda row: float(row["HOTA"]))
+        parts.append((ours, best, len({row["tracker"].removesuffix(", tuned") for row in others})))
+    (ours, best, count), *real = parts
+    listed = ", ".join(
+        f"{n} {number(a['HOTA'])} ({number(b['HOTA'])})" for n, (a, b, _) in zip(RECORDINGS.values(), real, strict=True)
+    )
+    return (
+        "- **People**: on 24 simulated scenes with occlusion, from the same boxes, `blob` reaches HOTA"
+        f" {number(ours['HOTA'])} and group F1 {number(ours['group_F1'])}; the best of {count} trackers of other"
+        f" libraries ({best['tracker']}) {number(best['HOTA'])} and {number(best['group_F1'])}. From the boxes of"
+        f" recordings, and in brackets the best other: {listed} ([table](docs/results/trackers.md#beside-other-trackers))."
+    )
+
+
+def groups() -> str:
+    """The belief of who belongs together beside SPENCER."""
+    found = {row["recording"]: row for row in rows("belonging-recordings")}
+    listed = " and ".join(
+        f"{number(found[name]['belief'])} on {name} ({number(found[name]['SPENCER'])})"
+        for name in ("seq_hotel", "zara01")
+    )
+    return (
+        f"- **Groups**: who walks together, from labelled positions: pairwise F1 {listed}; in brackets SPENCER's"
+        " relation ([table](docs/results/belonging.md))."
+    )
+
+
+def speed() -> str:
+    """Simulator beside JuPedSim, scores beside TrackEval."""
+    simulated = rows("simulator")
+    ratios = [number(row["ratio (range)"], 1) for row in simulated]
+    faster = next(
+        row["times ours"]
+        for row in rows("scoring")
+        if row["HOTA, CLEAR, Identity of 1000 frames × 30 people"] == "TrackEval"
+    )
+    return (
+        f"- **Speed**: the simulator makes {min(ratios)} to {max(ratios)} times as many steps as JuPedSim with"
+        f" {simulated[0]['people']} to {simulated[-1]['people']} people; HOTA, CLEAR and Identity equal TrackEval's and"
+        f" take a {number(faster, 0)}th of its time ([table](docs/results/cost.md))."
+    )
+
+
+def tuning() -> str:
+    """What tuning earns, and where it earns nothing."""
+    plain, blob = stored("tuning", "Follower")["rows"], stored("tuning", "Blob")["rows"]
+    scenes, real = (" and ".join(signed(row[k]) for row in plain) for k in (2, 4))
+    return (
+        f"What it earns: a plain tracker gains HOTA {scenes} on scenes like two recordings, and {real} on the"
+        f" recordings themselves; `blob`, whose defaults are tuned, {' and '.join(signed(row[4]) for row in blob)}"
+        " there ([table](docs/results/trackers.md#does-tuning-on-simulated-scenes-help-on-recordings); a star: sure)."
+    )
+
+
+PARTS = {"results": lambda: "\n".join([peers(), groups(), speed()]), "tuning": tuning}
+
+
+def written(text: str) -> str:
+    """Returns the text of README with the sentences of the tables stored now."""
+    return BLOCK.sub(lambda found: f"{found[1]}{PARTS[found[2]]()}\n{found[3]}", text)
+
+
+def main() -> None:
+    parser = new_parser(__doc__)
+    parser.add_argument("--write", action="store_true", help="write them into README.md")
+    if parser.parse_args().write:
+        README.write_text(written(README.read_text(encoding="utf-8")), encoding="utf-8")
+    else:
+        print("\n\n".join(part() for part in PARTS.values()))
+
+
+if __name__ == "__main__":
+    main()
