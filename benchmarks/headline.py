@@ -58,7 +58,8 @@ def peers() -> str:
         "- **People**: on 24 simulated scenes with occlusion, from the same boxes, `blob` reaches HOTA"
         f" {number(ours['HOTA'])} and group F1 {number(ours['group_F1'])}; the best of {count} trackers of other"
         f" libraries ({best['tracker']}) {number(best['HOTA'])} and {number(best['group_F1'])}. From the boxes of"
-        f" recordings, and in brackets the best other: {listed} ([table](docs/results/trackers.md#beside-other-trackers))."
+        f" recordings, and in brackets the best other: {listed}"
+        " ([table](docs/results/trackers.md#beside-other-trackers))."
     )
 
 

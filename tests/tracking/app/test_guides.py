@@ -10,7 +10,6 @@ import shlex
 from difflib import SequenceMatcher
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from tests.small_videos import picture, write_video
@@ -167,11 +166,8 @@ def test_commands_of_the_readme(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("code", blocks("python"), ids=["a scene", "own arrays"])
+@pytest.mark.parametrize("code", blocks("python"))
 def test_python_of_the_readme(code, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    rows = [[f, p, 1.2 * f / 10 + p % 2, p, 1 + p // 3] for f in range(1, 41) for p in range(1, 5)]
-    for name in ("truth", "mine"):
-        np.savetxt(f"{name}.csv", rows, delimiter=",")
     exec(compile(code, "README.md", "exec"), {})
     assert "HOTA" in capsys.readouterr().out
