@@ -12,8 +12,8 @@ visibility_px`: number of people, then mean, mean absolute, 95 % and largest dif
 visible / amodal pixels, of people with at least 50 amodal pixels and no part outside the image. The geometric
 visibility samples a grid of 16 x 32 points per person, orders people by distance, and takes people behind stairs for
 flat.
-gallery: one frame of several scenarios; of `crowd` also the ids (left half) and disparities (right half, black where
-unknown).
+gallery: one frame of several scenarios, most of them the quarter with most people; of `crowd` also the ids (left half)
+and disparities (right half, black where unknown).
 """
 
 from __future__ import annotations
@@ -35,16 +35,17 @@ from sim.types import Camera, Motion
 from tests import reference_render
 
 FRAMES = {"crowd": 60, "stairs": 110, "pillar": 80, "lights": 60, "mixed": 80, "clutter": 60, "street": 150}
+WHOLE = ("stairs", "clutter")  # not cut
 GALLERY_SEED, QUALITY = 40_001, 82
 LEAST_PX = 50
 COLUMNS = "scenario", "ids", "disparity", "px", "box", "people", "mean", "abs", "95 %", "largest"
 
 
-def half_size(camera: Camera) -> Camera:
-    """Returns the same view with half the width and height in pixels."""
-    width, height = (n // 2 for n in camera.image)
-    focal = (camera.focal_px[0] / 2, camera.focal_px[1] / 2)
-    scale = camera.px_per_m / 2
+def resized(camera: Camera, factor: float) -> Camera:
+    """Returns the same view with `factor` times the width and height in pixels."""
+    width, height = (int(n * factor) for n in camera.image)
+    focal = (camera.focal_px[0] * factor, camera.focal_px[1] * factor)
+    scale = camera.px_per_m * factor
     return camera.replace(image=(width, height), focal_px=focal, centre_px=(width / 2, height / 2), px_per_m=scale)
 
 
@@ -89,7 +90,7 @@ def exactness(args: argparse.Namespace) -> None:
         scenario = load(name)
         motion = run(scenario, args.seed)
         camera = place_camera(scenario.camera, motion)
-        wrong = differences_from_slow(motion, half_size(camera), len(motion.present) // 2)
+        wrong = differences_from_slow(motion, resized(camera, 0.5), len(motion.present) // 2)
         off, edge = differences_from_geometry(Renderer(motion, camera), args.step)
         every.append(off)
         size = np.abs(off)
@@ -105,16 +106,26 @@ def gallery_renderer(name: str) -> Renderer:
     settings = ["camera.kind=top"] if name == "mixed" else []
     scenario = load(name, settings)
     motion = run(scenario, GALLERY_SEED)
-    return Renderer(motion, place_camera(scenario.camera, motion), scenario.light, scenario.picture)
+    camera = resized(place_camera(scenario.camera, motion), 1 if name in WHOLE else 2)
+    return Renderer(motion, camera, scenario.light, scenario.picture)
 
 
-def truth_picture(made: Renderer, index: int) -> np.ndarray:
+def window(made: Renderer, index: int) -> tuple[slice, slice]:
+    """Returns the rows and columns of a quarter of the picture, the one that shows most of the people."""
+    ids, (width, height) = made.pixels(index).ids, made.camera.image
+    corners = [(top, left) for top in range(0, height // 2, height // 16) for left in range(0, width // 2, width // 16)]
+    parts = [(slice(top, top + height // 2), slice(left, left + width // 2)) for top, left in corners]
+    inner = [(slice(r.start + 30, r.stop - 30), slice(c.start + 30, c.stop - 30)) for r, c in parts]
+    return parts[int(np.argmax([np.count_nonzero(ids[part]) for part in inner]))]
+
+
+def truth_picture(made: Renderer, index: int, near: tuple[slice, slice]) -> np.ndarray:
     """Returns a BGR picture: ids in colours in the left half, disparities in the right half."""
     pixels = made.pixels(index, disparity=True)
     assert pixels.disparity is not None
     hues, value = (pixels.ids * 47 % 180).astype(np.uint8), np.where(pixels.ids > 0, 230, 0).astype(np.uint8)
     people = cv2.cvtColor(np.dstack([hues, value, value]), cv2.COLOR_HSV2BGR)
-    d = pixels.disparity
+    d, people = pixels.disparity[near], people[near]
     scaled = np.nan_to_num(255 * (d - np.nanmin(d)) / (np.nanmax(d) - np.nanmin(d))).astype(np.uint8)
     depth = np.where(np.isnan(d)[..., None], 0, cv2.applyColorMap(scaled, cv2.COLORMAP_VIRIDIS)).astype(np.uint8)
     middle = d.shape[1] // 2
@@ -125,9 +136,10 @@ def gallery(args: argparse.Namespace) -> None:
     cells = []
     for name, index in FRAMES.items():
         made = gallery_renderer(name)
-        cells.append(made.frame(index))
+        near = (slice(None), slice(None)) if name in WHOLE else window(made, index)
+        cells.append(made.frame(index)[near])
         if name == "crowd":
-            cells.append(truth_picture(made, index))
+            cells.append(truth_picture(made, index, near))
     pairs = [np.hstack(cells[k : k + 2]) for k in range(0, len(cells), 2)]
     small = cv2.resize(np.vstack(pairs), None, fx=0.75, fy=0.75, interpolation=cv2.INTER_AREA)
     cv2.imwrite(str(args.out), small, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
