@@ -7,6 +7,8 @@ files, names and command lines is made safe to print: no control characters, and
 from __future__ import annotations
 
 import unicodedata
+from collections.abc import Iterator
+from contextlib import contextmanager
 from functools import partial
 from typing import ClassVar, Self
 
@@ -69,6 +71,18 @@ def reject(wrong: object, file: object, got: object, expected: object, remedy: s
     """Raises InputError, with these parts, if `wrong` is true."""
     if wrong:
         raise InputError(file=file, place=place, got=got, expected=expected, remedy=remedy)
+
+
+@contextmanager
+def extra_needed(extra: str, place: str) -> Iterator[None]:
+    """Turns an ImportError of the block into an InputError that tells how to install `extra`. place: what needs it."""
+    try:
+        yield
+    except ImportError as error:
+        raise InputError(
+            place=place, got=f"no package {error.name}", expected=f"the extra [{extra}]",
+            remedy=f'pip install "flockscope[{extra}]", or in a clone: pip install -c constraints.txt -e ".[{extra}]"',
+        ) from None  # fmt: skip
 
 
 class OrderError(WorkError):

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
-from scenarios.errors import InputError, WorkError
+from scenarios.errors import InputError, WorkError, extra_needed
 from sim.hashing import runtime
 from sim.workers.calls import THREAD_VARIABLES, OnLoss, R, RunItems, T, WorkResult, run_pickled, worker_loss
 
@@ -84,13 +84,8 @@ def _connect(address: str) -> Any:
     if not re.fullmatch(ADDRESS, address):
         expected, remedy = "tcp://HOST:PORT", "give the address that `dask scheduler` prints"
         raise InputError(place="--cluster", got=repr(address), expected=expected, remedy=remedy)
-    try:
+    with extra_needed("cluster", "--cluster"):
         from distributed import Client
-    except ImportError:
-        raise InputError(
-            place="--cluster", got="no dask.distributed here", expected="the extra [cluster]",
-            remedy='in the folder of the sources: pip install -c constraints.txt -e ".[cluster]"',
-        ) from None  # fmt: skip
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # our errors say the same in one line
     try:
         return Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False, name="flockscope")

@@ -16,7 +16,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from scenarios.errors import InputError, counted
+from scenarios.errors import counted, extra_needed
 from sim.store.own_files import Marks, output_file, refuse_foreign_file
 from sim.types import Tracker
 from tracking.episodes.parallel_episodes import episode_player
@@ -90,13 +90,9 @@ def _search(options: TuneOptions) -> TuningResult:
 
 def require_optuna(place: str) -> None:
     """Raises InputError if Optuna or filelock is missing; place: what needs them."""
-    try:
+    with extra_needed("tune", place):
         import filelock  # noqa: F401
         import optuna  # noqa: F401
-    except ImportError as error:
-        remedy = 'in the folder of the sources: pip install -c constraints.txt -e ".[tune]"'
-        got, expected = f"no {error.name}", "the packages optuna and filelock"
-        raise InputError(place=place, got=got, expected=expected, remedy=remedy) from None
 
 
 def _checked_target(out: Path, candidates: int) -> Path:

@@ -86,6 +86,7 @@ def overlay_pictures(sequence: Sequence, layers: SequenceOf[Layer]) -> Iterator[
 
 
 def drawn(picture: Image, fps: float, index: int, layers: SequenceOf[Layer]) -> Image:
+    """Returns the picture of frame `index` with the layers drawn over it, at twice its size if it is less than LOW."""
     factor = 2 if len(picture) < LOW else 1
     image = np.array(cv2.resize(picture, None, fx=factor, fy=factor, interpolation=cv2.INTER_LINEAR), np.uint8)
     size = np.array(picture.shape[1::-1], float)

@@ -6,7 +6,7 @@ import math
 import re
 from pathlib import Path
 
-from scenarios.errors import InputError
+from scenarios.errors import extra_needed
 from sim.store.atomic import write_file
 from sim.store.own_files import GENERATOR
 from tracking.app.replay_page.page import page_html, script_json, theme
@@ -24,14 +24,9 @@ PARTS = {
 
 def check_packages() -> None:
     """Raises InputError if a package that reports need is not installed."""
-    try:
+    with extra_needed("report", "report.html"):
         import bokeh  # noqa: F401
         import jinja2  # noqa: F401
-    except ImportError as error:
-        raise InputError(
-            place="report.html", got=f"no package {error.name}", expected="the extra report",
-            remedy='in the folder of the sources: pip install -c constraints.txt -e ".[report]"',
-        ) from None  # fmt: skip
 
 
 def write_report(report: Report, path: Path) -> None:
