@@ -21,9 +21,9 @@ from tracking.ranking import Ranking, rank, recording_rankings
 from tracking.running.run import TrackingRun, input_name, input_summary
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scorer, Scores
-from tracking.scoring.group_scores import GroupMatch
-from tracking.scoring.people_comparison import IncomparableError, Similarity
-from tracking.scoring.pooled_scores import pooled
+from tracking.scoring.groups import GroupMatch
+from tracking.scoring.people import IncomparableError, Similarity
+from tracking.scoring.pooling import pooled
 from tracking.stats import SURE, few, mean_of_finite
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ from tracking.parameter_space import Space, decode, decode_and_build, space_of
 from tracking.running.detection_mode import choose_mode
 from tracking.running.prepare import Params, config_of
 from tracking.running.tracker_registry import config_class, find
-from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.people import Similarity
 
 RESET_OPTIONS = ("scenario", "seed", "params")
 Floats = NDArray[np.float32]

@@ -22,7 +22,7 @@ from tracking.running.time_limit import TimeLimited
 __all__ = ["Episode", "Rollout", "Source", "SourceCache", "play", "sources", "streams_for"]
 
 if TYPE_CHECKING:
-    from tracking.scoring.people_comparison import Similarity
+    from tracking.scoring.people import Similarity
 
 AnyTracker = str | type[Tracker] | TimeLimited
 
@@ -164,7 +164,7 @@ class Rollout:
         if `every` is True all. Raises InputError if tracks and labels cannot be compared."""
         from tracking.grouping.foot_points import completed
         from tracking.running.run import TrackingRun
-        from tracking.scoring.people_comparison import IncomparableError
+        from tracking.scoring.people import IncomparableError
 
         known, source = self.prepared.context, self.prepared.input
         tracks, _ = completed(

@@ -5,7 +5,7 @@ from the name of a score to its value. `pooled` makes the scores of several sequ
 """
 
 from tracking.scoring.evaluation import evaluate
-from tracking.scoring.pooled_scores import pooled
+from tracking.scoring.pooling import pooled
 from tracking.scoring.user_arrays import score_arrays
 
 __all__ = ["evaluate", "pooled", "score_arrays"]
