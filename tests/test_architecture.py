@@ -80,8 +80,8 @@ def test_trackers_and_detectors_see_neither_truth_nor_scores():
     names = of("tracking.papers", "tracking.detect")
     assert names
     hidden = (
-        "tracking.scoring", "tracking.running.detection_mode", "tracking.app", "sim.truth.label",
-        "sim.truth.merge_split_events", "sim.truth.group_hulls", "sim.truth.crossing_events",
+        "tracking.scoring", "tracking.running.detection_mode", "tracking.running.truth_detections", "tracking.app",
+        "sim.truth.label", "sim.truth.merge_split_events", "sim.truth.group_hulls", "sim.truth.crossing_events",
         "sim.truth.queue_detection", "sim.store", "sim.sequence", "tracking.recordings", "tracking.export",
     )  # fmt: skip
     assert offences(names, *hidden) == []

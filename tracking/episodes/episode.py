@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING, Any
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Frame, Sequence, Tracker, Tracks, Truth
-from tracking.episodes.episode_cache import OpenedSource, Source, SourceCache, sources
+from tracking.episodes.episode_cache import OpenedSource, SourceCache
+from tracking.episodes.sources import Source, sources
 from tracking.running.prepare import Params, prepare
 from tracking.running.time_limit import TimeLimited
 

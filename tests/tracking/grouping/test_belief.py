@@ -10,7 +10,7 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tests import reference_belief as slow
 from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs
-from tracking.grouping.grouping_choice import belief_groups, groups_of_steps
+from tracking.grouping.belief_groups import belief_groups, groups_of_steps
 from tracking.grouping.pair_evidence import NAMES, StepRows, evidence
 
 

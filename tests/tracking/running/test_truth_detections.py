@@ -10,9 +10,10 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Detections, Sequence
 from tests.tracking.running.test_run import Stranger
-from tracking.running.detection_mode import check_detections, choose_mode, from_truth
+from tracking.running.detection_mode import check_detections, choose_mode
 from tracking.running.prepare import prepare
 from tracking.running.run import track
+from tracking.running.truth_detections import from_truth
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +34,7 @@ class Writing(Stranger):
 
 
 def test_the_order_depends_on_seed_and_frame_alone(merge):
-    first, again, other = (from_truth(merge, {}, seed).detections for seed in (3, 3, 4))
+    first, again, other = (from_truth(merge, {}, seed)[0] for seed in (3, 3, 4))
     assert all(np.array_equal(a.pos, b.pos) for a, b in zip(first, again, strict=True))
     assert not all(np.array_equal(a.pos, b.pos) for a, b in zip(first, other, strict=True))
     for index, found in enumerate(first, 1):
@@ -111,7 +112,7 @@ def test_nan_names_frame_and_row():
 def test_settings_with_dots_are_keys_of_a_table(merge):
     """One key of box_noise brings its defaults; without any, boxes are exact."""
     exact, whole, dotted = (
-        [d.box for d in from_truth(merge, sensor, 0).detections]
+        [d.box for d in from_truth(merge, sensor, 0)[0]]
         for sensor in ({"noise_m": 0.1}, {"box_noise": {"scale": 2.0}}, {"box_noise.scale": 2.0})
     )
     assert all(map(np.array_equal, whole, dotted))

@@ -14,7 +14,7 @@ from tests.groups_as_wholes import wholes
 from tests.reference_polygons import area, footprint_hull
 from tracking.app.replay_page import page_rows
 from tracking.app.replay_page.page import Run, page_data
-from tracking.app.replay_page.page_rows import Bar, bars, links
+from tracking.app.replay_page.timeline import Bar, bars, links
 
 
 def test_bars_and_links_of_groups(sequence: Sequence) -> None:
