@@ -21,7 +21,6 @@ from scenarios.errors import InputError
 from sim.scene.standing import standing_points
 from sim.types import DetectionMode, Detections, Frame, Ints, Sequence
 from tracking.running.tracks_check import finite
-from tracking.running.truth_detections import from_truth
 
 InputKind = Literal["points", "boxes", "pixels", "stereo"]
 
@@ -80,6 +79,8 @@ def given_detections(
     """Returns the detections of the mode "file" or "truth". sensor, seed: degrade and shuffle those of "truth". owned:
     whether the owners of stored detections are read, too."""
     if mode == "truth":
+        from tracking.running.truth_detections import from_truth
+
         return Given(*from_truth(sequence, sensor, seed))
     owners = sequence.load_owners() if owned and sequence.load_owners is not None else None
     return Given([f.detections for f in sequence.without_pictures()], owners)

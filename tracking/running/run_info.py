@@ -59,7 +59,7 @@ def facts_of_tracks(
     sequence: Sequence, tracks: SequenceOf[Tracks], scale: ImageScale, ground: Ground, begins: int | None
 ) -> dict[str, Any]:
     """Returns what run.json tells of tracks, whoever made them: of the sequence, plane, boxes, scale and causality."""
-    from sim.store.track_files import box_source
+    from sim.store.track_boxes import box_source
 
     begins = None if begins is None else max(begins, scale.frames, ground.frames)
     return {

@@ -309,9 +309,5 @@ def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
 def weighted_people(pairs: Pairs, size: int, hota: Callable[[Array], Array]) -> WeightedScores:
     """Returns a function from weights (D, size) of frames to the scores of HOTA, CLEAR and identity, (D,) by key. size:
     length of the recording + 1. hota: as of `hota_sums`. No id may be twice in a frame."""
-    parts = [scores(pairs, size) for scores in (weighted_clear, weighted_identity)]
-
-    def score(weights: Array) -> dict[str, Array]:
-        return hota_scores(hota(weights)) | parts[0](weights) | parts[1](weights)
-
-    return score
+    clear, identity = weighted_clear(pairs, size), weighted_identity(pairs, size)
+    return lambda weights: hota_scores(hota(weights)) | clear(weights) | identity(weights)

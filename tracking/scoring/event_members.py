@@ -23,14 +23,13 @@ COUNTS_AS = {"form": "merge", "dissolve": "split"}
 HEADLINE = ("merge", "split")
 HULL_TIME = 2.0  # s before and after an event in which hulls decide who is in a group: the time of the merge rule
 CHANGES = frozenset(HEADLINE) | {kind for kind, counts_as in COUNTS_AS.items() if counts_as in HEADLINE}
-PersonIds = frozenset[int]
 
 
 @dataclass(frozen=True, slots=True)
 class EventMembers:
     """The members of an event, or of one group before or after it, as true people."""
 
-    people: PersonIds  # ids of true people
+    people: frozenset[int]  # ids of true people
     unmatched: int = 0  # number of further members that are mapped to no true person, or to one already in `people`
 
     def jaccard(self, other: EventMembers) -> float:

@@ -133,8 +133,7 @@ def near_changes(truth: Truth) -> Bools:
     """Returns which of the frame numbers 0 … length are at most 1 s from the start of a true merge or split. The result
     is bool, (length + 1,). `form` counts as a merge and `dissolve` as a split."""
     starts = np.array([e.start for e in truth.events or () if e.kind in CHANGES], float)
-    frame = np.arange(truth.length + 1)
-    away = np.abs(frame[:, None] - starts[None]).min(axis=1, initial=np.inf)
+    away = np.abs(np.arange(truth.length + 1)[:, None] - starts).min(axis=1, initial=np.inf)
     return np.asarray(away <= CORE * truth.fps + 1e-9)
 
 

@@ -12,8 +12,6 @@ import numpy as np
 from sim.arrays import repeated_ids
 from sim.types import Bools, Ints
 
-NO_ROWS = (0, 0)
-
 
 @dataclass(frozen=True, slots=True)
 class FrameRows:
@@ -86,7 +84,7 @@ class RowLookup:
     def nearest(self, id: int, frame: int, back: int, ahead: int) -> int:
         """Returns the index of the id's row nearest to `frame`, if it lies in [frame - back, frame + ahead], else -1.
         Of two rows equally near, the earlier one is returned."""
-        low, high = self.span.get(id, NO_ROWS)
+        low, high = self.span.get(id, (0, 0))
         at = bisect_left(self.frame, frame, low, high)
         near = [k for k in (at - 1, at) if low <= k < high and -back <= self.frame[k] - frame <= ahead]
         return self.row[min(near, key=lambda k: abs(self.frame[k] - frame))] if near else -1
