@@ -14,6 +14,7 @@ from tests.processes import ROOT
 
 PACKAGES = ("scenarios", "sim", "tracking")
 LINES = 500
+SPANNING = 50  # most test files that are not named after a module
 # What scoring may import of ours: people use it alone, on their own arrays.
 SCORING = (
     "scenarios.limits", "tracking.scoring", "tracking.grouping.grouped_tracks", "tracking.grouping.foot_points",
@@ -114,6 +115,15 @@ def test_a_package_is_met_in_its_modules_only(package: str, only: str) -> None:
 def test_modules_are_short():
     lengths = {name: len(path.read_text(encoding="utf-8").splitlines()) for name, path in modules().items()}
     assert {name: length for name, length in lengths.items() if length > LINES} == {}
+
+
+def test_tests_mirror_the_sources() -> None:
+    """tests/PATH/test_MODULE.py, or test_MODULE_ASPECT.py, tests PATH/MODULE.py. Other files span modules of a room."""
+    files = [path.relative_to(ROOT / "tests") for path in (ROOT / "tests").rglob("test_*.py")]
+    assert {path.parent for path in files if not (ROOT / path.parent).is_dir()} == set()
+    sources = {str(path.relative_to(ROOT).with_suffix("")).removesuffix("_kernels") for path in modules().values()}
+    named = [str(path.parent / path.stem.removeprefix("test_")).removesuffix("_kernels") for path in files]
+    assert sum(not any(f"{name}_".startswith(f"{source}_") for source in sources) for name in named) <= SPANNING
 
 
 def test_no_room_has_more_lines_than_its_budget():
