@@ -50,5 +50,5 @@ def test_links_join_and_fork() -> None:
         return GroupEvent(kind, 10, 12, emitted, before, after, (), (0.0, 0.0))
 
     merge, split = event("merge", (-1, 1, 2), (1,)), event("split", (1,), (1, 3), emitted=14)
-    made = links([merge, split, event("cross", (1, 2), (1, 2)), event("form", (-1, -1), (4,))])
-    assert made == [(10, 2, 1), (14, 1, 3)]
+    more = event("cross", (1, 2), (1, 2)), event("form", (-1, -1), (4,))
+    assert links((merge, split, *more)) == [(10, 2, 1), (14, 1, 3)]
