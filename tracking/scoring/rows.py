@@ -1,5 +1,4 @@
-"""Rows of people or groups of one side (the truth or a tracker), one row per frame and id; lookups of a row by frame
-and id."""
+"""Rows of people or groups of one side (the truth or a tracker), one per frame and id; look-ups of a row by both."""
 
 from __future__ import annotations
 
