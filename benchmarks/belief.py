@@ -39,12 +39,14 @@ from benchmarks.support.replaced_code import replaced_code
 from benchmarks.support.tables import difference_cell, head, interval, mean_cell, number, row, signed, table
 from scenarios.loading.resolve import resolve
 from sim.types import Array, Bools, Ints, Truth
-from tracking.fitting.belief import BINS, belief_scores, fit_belief, reliability, sample_of
+from tracking.fitting.belief import fit_belief, sample_of
+from tracking.fitting.belief_scores import BINS, belief_scores, reliability
 from tracking.fitting.grouping_scenes import DETECTED, MISSED, pair_scenes, simulated
 from tracking.grouping import grouping_choice
 from tracking.grouping.belief import Belief, pair_probabilities
+from tracking.grouping.belief_groups import FoundGroups, belief_groups
 from tracking.grouping.grouped_tracks import derive
-from tracking.grouping.grouping_choice import FoundGroups, Grouping, belief_groups, grouping_of
+from tracking.grouping.grouping_choice import Grouping, grouping_of
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
 from tracking.grouping.pair_evidence import NAMES, NEAR, QUANTITIES, TIMES

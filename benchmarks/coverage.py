@@ -25,7 +25,7 @@ from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Tracks, Truth
-from tracking.ranking import SCALES, presence
+from tracking.recording_ranking import SCALES, presence
 from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scorer

@@ -34,11 +34,11 @@ from tracking.recordings.mot_table import read_table
 from tracking.recordings.source import open_source
 from tracking.recordings.track_texts import read_checked_tracks
 from tracking.scoring import evaluate, pooled
-from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
 from tracking.scoring.evaluation import weighted_people
+from tracking.scoring.frame_weights import unweighted
+from tracking.scoring.hota import hota_sums
 from tracking.scoring.rows import FrameRows
-from tracking.scoring.track_scores import hota_sums
-from tracking.scoring.weighted_sums import unweighted
+from tracking.scoring.similarity import Pairs, box_pairs, point_pairs
 
 REACH = 2.0  # m
 TOLERANCE = 1e-6

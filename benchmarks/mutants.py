@@ -44,7 +44,7 @@ ROOMS = (
     "sim.crowd", "sim.truth", "sim.detector", "sim.scene", "sim.geometry", "sim.workers", "tracking.filters",
     "tracking.detect", "tracking.grouping", "tracking.papers", "tracking.running", "tracking.scoring",
     "tracking.errors", "tracking.stress", "tracking.tuning", "tracking.episodes", "tracking.stats", "tracking.ranking",
-    "tracking.oracle",
+    "tracking.recording_ranking", "tracking.oracle",
 )  # fmt: skip
 # `|` stands in annotations for the most part, and `**` in calls.
 KINDS = (

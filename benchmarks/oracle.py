@@ -41,7 +41,7 @@ from tracking.oracle import oracle
 from tracking.recordings.source import open_source
 from tracking.running.run import track
 from tracking.scoring.evaluation import Scorer
-from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.people import Similarity
 
 RECORDINGS = "recordings"
 REAL = (PETS, CAMPUS, TOWN_CENTRE)

@@ -41,7 +41,7 @@ from scenarios.schema.scenario import Scenario
 from sim.render.weather import brightness
 from sim.sequence import simulate
 from sim.types import Array, Sequence, Tracks, Truth
-from tracking.episodes.episode_cache import Source
+from tracking.episodes.sources import Source
 from tracking.episodes.tuned_tracker import TunedTracker
 from tracking.oracle import oracle
 from tracking.running.tracker_registry import find

@@ -29,7 +29,7 @@ from tracking.config import Config, param
 from tracking.fitting.detection_matching import match_sequence
 from tracking.fitting.sensor import fit_matched
 from tracking.papers.blob.tracker import Blob
-from tracking.ranking import presence_in
+from tracking.recording_ranking import presence_in
 from tracking.recordings.source import open_source
 from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from tracking.scoring.candidate_pairs import EPS, Pairs
 from tracking.scoring.rows import FrameRows
+from tracking.scoring.similarity import EPS, Pairs
 
 
 def matrix_pairs(

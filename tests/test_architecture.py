@@ -14,6 +14,7 @@ from tests.processes import ROOT
 
 PACKAGES = ("scenarios", "sim", "tracking")
 LINES = 500
+SPANNING = 50  # most test files that are not named after a module
 # What scoring may import of ours: people use it alone, on their own arrays.
 SCORING = (
     "scenarios.limits", "tracking.scoring", "tracking.grouping.grouped_tracks", "tracking.grouping.foot_points",
@@ -80,8 +81,8 @@ def test_trackers_and_detectors_see_neither_truth_nor_scores():
     names = of("tracking.papers", "tracking.detect")
     assert names
     hidden = (
-        "tracking.scoring", "tracking.running.detection_mode", "tracking.app", "sim.truth.label",
-        "sim.truth.merge_split_events", "sim.truth.group_hulls", "sim.truth.crossing_events",
+        "tracking.scoring", "tracking.running.detection_mode", "tracking.running.truth_detections", "tracking.app",
+        "sim.truth.label", "sim.truth.merge_split_events", "sim.truth.group_hulls", "sim.truth.crossing_events",
         "sim.truth.queue_detection", "sim.store", "sim.sequence", "tracking.recordings", "tracking.export",
     )  # fmt: skip
     assert offences(names, *hidden) == []
@@ -114,6 +115,14 @@ def test_a_package_is_met_in_its_modules_only(package: str, only: str) -> None:
 def test_modules_are_short():
     lengths = {name: len(path.read_text(encoding="utf-8").splitlines()) for name, path in modules().items()}
     assert {name: length for name, length in lengths.items() if length > LINES} == {}
+
+
+def test_tests_mirror_the_sources() -> None:
+    """tests/PATH/test_MODULE.py, or test_MODULE_ASPECT.py, tests PATH/MODULE.py. Other files span modules of a room."""
+    files = [path.relative_to(ROOT / "tests") for path in (ROOT / "tests").rglob("test_*.py")]
+    assert {path.parent for path in files if not (ROOT / path.parent).is_dir()} == set()
+    sources = tuple(f"{name.replace('.', '/').removesuffix('_kernels')}_" for name in modules())
+    assert sum(not f"{path.parent / path.stem[5:]}_".startswith(sources) for path in files) <= SPANNING
 
 
 def test_no_room_has_more_lines_than_its_budget():

@@ -17,13 +17,15 @@ import numpy as np
 from scenarios.errors import InputError
 from sim.types import Array, Sequence, Tracks
 from tracking.oracle import oracle
-from tracking.ranking import Ranking, rank, recording_rankings
-from tracking.running.run import TrackingRun, input_name, input_summary
+from tracking.ranking import Ranking, rank
+from tracking.recording_ranking import recording_rankings
+from tracking.running.run import TrackingRun
+from tracking.running.run_info import input_name, input_summary
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scorer, Scores
-from tracking.scoring.group_scores import GroupMatch
-from tracking.scoring.people_comparison import IncomparableError, Similarity
-from tracking.scoring.pooled_scores import pooled
+from tracking.scoring.groups import GroupMatch
+from tracking.scoring.people import IncomparableError, Similarity
+from tracking.scoring.pooling import pooled
 from tracking.stats import SURE, few, mean_of_finite
 
 if TYPE_CHECKING:

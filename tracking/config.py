@@ -18,7 +18,6 @@ from typing import Any, ClassVar, Literal, Self, cast
 from scenarios.errors import InputError
 from scenarios.limits import is_number
 from scenarios.loading.toml_files import did_you_mean, parse, toml_value
-from sim.store.numeric_text import read_number
 from tracking.user_code import tracker_failed, user_code
 
 Scale = Literal["linear", "log", "int", "categorical", "vector"]
@@ -72,6 +71,8 @@ class Param:
 
     def parse(self, text: str) -> Value:
         """Returns the value that a text stands for; commas separate numbers of a vector. Raises InputError if wrong."""
+        from sim.store.numeric_text import read_number
+
         for choice in self.choices:
             if text == str(choice) or (isinstance(choice, bool) and text.lower() == str(choice).lower()):
                 return choice

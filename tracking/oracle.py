@@ -19,25 +19,14 @@ from typing import Any
 
 import numpy as np
 
-from sim.types import (
-    EVENT_KINDS,
-    Array,
-    DetectionMode,
-    GroupEvent,
-    Groups,
-    Ints,
-    Plane,
-    Sequence,
-    Tracks,
-    Truth,
-)
+from sim.types import EVENT_KINDS, Array, DetectionMode, GroupEvent, Groups, Ints, Plane, Sequence, Tracks, Truth
 from tracking.grouping.grouped_tracks import groups_in_frames, with_velocities
 from tracking.running.detection_mode import choose_mode
 from tracking.running.prepare import InputFrames, input_frames
 from tracking.running.run import TrackingRun
-from tracking.scoring.candidate_pairs import EPS, FOUND
 from tracking.scoring.evaluation import Scorer
-from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.people import Similarity
+from tracking.scoring.similarity import EPS, FOUND
 
 # Returns the input of a sequence by mode, needs and seed.
 Inputs = Callable[[DetectionMode, tuple[str, ...], int], InputFrames]

@@ -29,7 +29,7 @@ from tracking.errors.found import FoundError, RunErrors, find_errors
 from tracking.errors.groups import GroupError
 from tracking.running.run import TrackingRun
 from tracking.scoring.evaluation import Scorer
-from tracking.scoring.group_and_event_scores import tracked_groups
+from tracking.scoring.group_rows import tracked_groups
 
 SCENES = ("merge", "split", "cross", "queue", "pillar", "mixed", "crowd", "party", "door", "street", "lights")
 DRAWN = 400  # places of which those to be used are chosen

@@ -22,9 +22,10 @@ from sim.geometry.polygons import gap_pairs, pack
 from sim.truth.crossing_events import CROSS_GAP
 from sim.types import Array, Groups, Ints, Tracks, Truth
 from tracking.scoring.evaluation import labelled_frames
-from tracking.scoring.group_scores import hull_pairs, matched_groups
-from tracking.scoring.people_and_groups import group_rows, people_inside, true_people
-from tracking.scoring.people_comparison import plane_of
+from tracking.scoring.ground_or_image import plane_of
+from tracking.scoring.group_rows import group_rows, people_inside
+from tracking.scoring.groups import hull_pairs, matched_groups
+from tracking.scoring.people import true_people
 
 SECOND = 1.0
 

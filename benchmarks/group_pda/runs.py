@@ -34,7 +34,7 @@ from tracking.papers.group_pda.group_bank import GroupBank
 from tracking.papers.group_pda.scaled_parameters import ScaledParameters
 from tracking.running.run import TrackingRun, track
 from tracking.scoring import evaluate
-from tracking.scoring.people_comparison import in_one_plane
+from tracking.scoring.ground_or_image import in_one_plane
 
 Row = dict[str, float]
 

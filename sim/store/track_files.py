@@ -9,7 +9,7 @@ boxes (px), and velocities from the last 0.5 s.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
@@ -18,15 +18,13 @@ import numpy as np
 
 from scenarios.errors import InputError, reject
 from sim.arrays import joined, repeated_ids
-from sim.scene.body import PERSON_HEIGHT
 from sim.store import group_files, tables
 from sim.store.atomic import lock_folder, replace_sealed
 from sim.store.seal import EXACT, NAMES, PAIRS, RUN, reject_foreign, sealed_run
 from sim.store.tables import AXES, BOX, PLANES, Count, Rate, along, table_bytes, units_of
+from sim.store.track_boxes import box_source, upright_boxes
 from sim.store.truth_files import mot_text, score_and_place, scores_or_ones, with_ground_height
 from sim.types import Array, Camera, GroupEvent, Groups, Ints, Scene, Tracks
-
-WIDTH = 0.50  # m, diameter of the upright cylinder
 
 
 @dataclass(frozen=True)
@@ -164,35 +162,6 @@ def _groups(path: Path, first: int, count: int) -> list[Groups | None]:
             got = "a place that is NaN or infinite" if once else "a group below 0, or a second time"
             table.reject(not (once and known), f"frame {index}", got, "unique ids from 0 and finite places")
     return found
-
-
-def box_source(tracks: Sequence[Tracks], camera: Camera | None) -> Literal["measured", "projected", "none"]:
-    """Returns the source of the boxes in stored tracks, as run.json names it under "boxes".
-
-    "measured": the tracker gives boxes. "projected": people get upright boxes by the camera. "none": neither.
-    """
-    if any(t.box is not None and len(t.id) for t in tracks):
-        return "measured"
-    upright = not any(t.plane == "image" or t.unit == "group" for t in tracks)
-    return "projected" if camera is not None and upright else "none"
-
-
-def upright_boxes(camera: Camera, pos: Array) -> Array:
-    """Returns the boxes (N, 4), left, top, width, height in px, of people at `pos` (N, 2 or 3) m.
-
-    A person is 1.7 m tall and 0.5 m across. Not clipped to the image; nan for a person who is partly behind the camera,
-    and for a nan position.
-    """
-    from sim.scene.camera import project
-
-    angle = np.arange(16) * (np.pi / 8)
-    rim = WIDTH / 2 * np.stack([np.cos(angle), np.sin(angle)], axis=1)
-    rim = np.concatenate([np.c_[rim, np.zeros(16)], np.c_[rim, np.full(16, PERSON_HEIGHT)]])
-    foot = pos if pos.shape[1] == 3 else np.concatenate([pos, np.zeros((len(pos), 1))], axis=1)
-    uv, depth = project(camera, (foot[:, None] + rim).reshape(-1, 3))
-    uv = np.where((depth > 0)[:, None], uv, np.nan).reshape(len(pos), 32, 2)
-    low, high = uv.min(axis=1), uv.max(axis=1)
-    return np.concatenate([low, high - low], axis=1)
 
 
 def write_tracks(

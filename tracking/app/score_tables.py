@@ -12,7 +12,7 @@ import numpy as np
 from scenarios.errors import InputError, printable
 from tracking.scoring.catalogue import ALL, CATALOGUE
 from tracking.scoring.evaluation import Scores
-from tracking.scoring.pooled_scores import pooled
+from tracking.scoring.pooling import pooled
 from tracking.stats import FEWEST, score_interval
 
 # The keys that are shown where there is room for one line only.

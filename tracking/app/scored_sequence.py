@@ -16,9 +16,9 @@ from tracking.app.tracker_setup import TrackerSetup
 from tracking.comparison import ComparedSequence, compare_one
 from tracking.recordings.options import BoxScale, parse_box_scale
 from tracking.running.run import TrackingRun
-from tracking.scoring.group_scores import GroupMatch
+from tracking.scoring.groups import GroupMatch
 from tracking.scoring.misreading import likely_misreading
-from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.people import Similarity
 
 Source = StoredTracks | str  # of the tracks of a sequence: stored ones, or the text that names a tracker class
 

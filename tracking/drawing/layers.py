@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from sim.geometry.hull_kernels import convex_hull
-from sim.store.track_files import upright_boxes
+from sim.store.track_boxes import upright_boxes
 from sim.store.truth_files import with_ground_height
 from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Scene, Tracks, Truth
 from tracking.drawing.canvas import box_corners

@@ -25,12 +25,13 @@ from sim.types import DetectionMode, Tracker
 from tracking.config import Config
 from tracking.environment.observation import NAMES, Observer
 from tracking.episodes.episode import Rollout, streams_for
-from tracking.episodes.episode_cache import DEFAULT_LIMIT, OpenedSource, Source, SourceCache, SourceSpec, sources
+from tracking.episodes.episode_cache import DEFAULT_LIMIT, OpenedSource, SourceCache
+from tracking.episodes.sources import Source, SourceSpec, sources
 from tracking.parameter_space import Space, decode, decode_and_build, space_of
 from tracking.running.detection_mode import choose_mode
 from tracking.running.prepare import Params, config_of
 from tracking.running.tracker_registry import config_class, find
-from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.people import Similarity
 
 RESET_OPTIONS = ("scenario", "seed", "params")
 Floats = NDArray[np.float32]

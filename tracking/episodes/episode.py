@@ -15,14 +15,15 @@ from typing import TYPE_CHECKING, Any
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Frame, Sequence, Tracker, Tracks, Truth
-from tracking.episodes.episode_cache import OpenedSource, Source, SourceCache, sources
+from tracking.episodes.episode_cache import OpenedSource, SourceCache
+from tracking.episodes.sources import Source, sources
 from tracking.running.prepare import Params, prepare
 from tracking.running.time_limit import TimeLimited
 
 __all__ = ["Episode", "Rollout", "Source", "SourceCache", "play", "sources", "streams_for"]
 
 if TYPE_CHECKING:
-    from tracking.scoring.people_comparison import Similarity
+    from tracking.scoring.people import Similarity
 
 AnyTracker = str | type[Tracker] | TimeLimited
 
@@ -164,7 +165,7 @@ class Rollout:
         if `every` is True all. Raises InputError if tracks and labels cannot be compared."""
         from tracking.grouping.foot_points import completed
         from tracking.running.run import TrackingRun
-        from tracking.scoring.people_comparison import IncomparableError
+        from tracking.scoring.people import IncomparableError
 
         known, source = self.prepared.context, self.prepared.input
         tracks, _ = completed(

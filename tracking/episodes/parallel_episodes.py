@@ -21,7 +21,7 @@ from tracking.grouping.link_rule import LinkRule
 from tracking.running.time_limit import TimeLimited
 from tracking.running.tracker_registry import find
 from tracking.running.used_files import code_of, used
-from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.people import Similarity
 
 CACHE_BYTES = 512 * 2**20  # Bytes of sequences that each process keeps for later episodes.
 

@@ -13,7 +13,7 @@ from tracking.grouping.link_rule import LinkRule
 from tracking.running.time_limit import TimeLimited
 from tracking.running.tracker_registry import config_class, find, located
 from tracking.running.used_files import code_of, folder_of
-from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.people import Similarity
 
 RULE = LinkRule.tracker
 

@@ -24,11 +24,12 @@ from tracking.errors.repairs import SHOWN, ComparedPeople, ComparedRun, scores
 from tracking.grouping.foot_points import source_of
 from tracking.oracle import named_detections
 from tracking.running.run import TrackingRun
-from tracking.scoring.candidate_pairs import REACH
 from tracking.scoring.evaluation import MatchedSides
-from tracking.scoring.group_and_event_scores import TrackedGroups, compared_events, tracked_groups
-from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.events import compared_events
+from tracking.scoring.group_rows import TrackedGroups, tracked_groups
+from tracking.scoring.people import Similarity
 from tracking.scoring.rows import find_rows
+from tracking.scoring.similarity import REACH
 
 EVERY = 10**9  # costs of all errors
 

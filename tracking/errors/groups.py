@@ -31,9 +31,10 @@ import numpy as np
 
 from sim.types import GroupEvent, Ints
 from tracking.errors.people import first_and_last
-from tracking.scoring.events import HEADLINE, MatchedEvents, same_lineage
-from tracking.scoring.group_scores import group_of_person, groups_found, shared_members
-from tracking.scoring.people_and_groups import GroupRows
+from tracking.scoring.event_members import HEADLINE
+from tracking.scoring.events import MatchedEvents, same_lineage
+from tracking.scoring.group_rows import GroupRows
+from tracking.scoring.groups import group_of_person, groups_found, shared_members
 from tracking.scoring.rows import FrameRows
 
 AT_THE_EVENT = 1.0  # s: a stretch that begins so soon after an event belongs to it

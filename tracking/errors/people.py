@@ -24,9 +24,9 @@ from typing import Literal
 import numpy as np
 
 from sim.types import Ints
-from tracking.scoring.candidate_pairs import Pairs
+from tracking.scoring.clear import clear_matches
 from tracking.scoring.rows import FrameRows
-from tracking.scoring.track_scores import clear_matches
+from tracking.scoring.similarity import Pairs
 
 PersonKind = Literal["switch", "fragment", "miss", "late", "ghost"]
 NOBODY = -1

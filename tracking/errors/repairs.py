@@ -16,12 +16,13 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.errors.groups import UNSEEN, GroupError, Memberships
 from tracking.errors.people import NOBODY, MatchedPeople, PersonError
-from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
-from tracking.scoring.group_scores import f1, groups_found, shared_members
-from tracking.scoring.people_and_groups import GroupRows
+from tracking.scoring.frame_weights import unweighted
+from tracking.scoring.group_rows import GroupRows
+from tracking.scoring.groups import f1, groups_found, shared_members
+from tracking.scoring.hota import weighted_hota
+from tracking.scoring.identity import weighted_identity
 from tracking.scoring.rows import FrameRows
-from tracking.scoring.track_scores import weighted_hota, weighted_identity
-from tracking.scoring.weighted_sums import unweighted
+from tracking.scoring.similarity import Pairs, box_pairs, point_pairs
 
 SHOWN = ("HOTA", "IDF1", "group_F1")
 OF_PEOPLE = {"HOTA": weighted_hota, "IDF1": weighted_identity}

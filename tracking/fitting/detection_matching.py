@@ -22,10 +22,10 @@ from sim.scene.visibility import image_size_of_boxes, with_visibility
 from sim.store.truth_files import scores_or_ones
 from sim.types import Array, Bools, Camera, Detections, Ints, Sequence, Truth, Unscored
 from tracking.scoring.annotated_frames import annotated_frames
-from tracking.scoring.candidate_pairs import compare, same_frame
 from tracking.scoring.matching import match
 from tracking.scoring.misreading import shifted_boxes
 from tracking.scoring.rows import FrameRows
+from tracking.scoring.similarity import compare, same_frame
 
 GATE = 0.3  # least overlap of a match
 IGNORED = 0.5  # least overlap of an unmatched detection with an unscored box for the detection to be dropped

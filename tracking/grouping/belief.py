@@ -1,4 +1,4 @@
-"""The belief that two people belong together: log-odds of each pair from fitted tables of evidence.
+"""The belief that two people belong together: of each pair and step its log-odds, from fitted tables of evidence.
 
 The belief of a row (`pair_evidence`) is a sum of tables, read off by linear interpolation. `flockscope fit grouping`
 fits the tables to simulated scenes and writes them as a text file; belief.toml beside this module is the default.
@@ -7,7 +7,7 @@ From one evidence two decisions, each with a column of log-odds in every table. 
 probability and `threshold`, by the loss of pairwise F1. *Events* follow from groups that change late (`stay`, `come`),
 as a false event costs more than a late one; their log-odds are fitted to scenes in which people meet and part.
 
-Also here: how probable it is that two tracked people belong together, for every pair and frame: a table of pairs.
+`pair_beliefs` gives the log-odds, `pair_probabilities` the probability of each pair of tracked people in each frame.
 """
 
 from __future__ import annotations

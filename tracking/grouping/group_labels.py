@@ -20,8 +20,8 @@ from sim.truth.merge_split_rules import frames_of, stretches
 from sim.truth.motion_rows import frames_of_change
 from sim.types import GroupEvent, Ints
 from tracking.grouping.belief import Belief
+from tracking.grouping.belief_groups import FoundGroups
 from tracking.grouping.group_events import Parts, TrackedMotion, corrects, event_of_change
-from tracking.grouping.grouping_choice import FoundGroups
 from tracking.grouping.link_rule import LinkRule
 
 

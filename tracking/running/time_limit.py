@@ -13,8 +13,6 @@ from typing import Any, Self
 from scenarios.errors import InputError
 from scenarios.limits import is_number
 from sim.types import Context, Detections, Frame, Tracker, Tracks
-from sim.workers.calls import RemoteTraceback
-from sim.workers.pool import WorkerProcess
 from tracking.config import Config
 from tracking.running import tracker_registry, used_files
 from tracking.running.image_scale import learned_by
@@ -41,6 +39,8 @@ class TimeLimited:
     """
 
     def __init__(self, tracker: str | type[Tracker], seconds: float) -> None:
+        from sim.workers.pool import WorkerProcess
+
         if not isinstance(tracker, str):
             expected, remedy = "a name that another process can look up", "give file.py:Class or module:Class"
             raise InputError(place="--step-timeout", got="no name of a tracker", expected=expected, remedy=remedy)
@@ -80,6 +80,8 @@ class TimeLimited:
         px_per_m, and what is new of that which it has used. Raises TimeoutError if the limit is exceeded,
         ChildProcessError if the process has ended, or what the tracker raised.
         """
+        from sim.workers.calls import RemoteTraceback
+
         future = self._process.submit(_call, (number, method, arguments, self.seconds + GRACE))
         try:
             result = self._process.outcome(future, None if method == "create" else self.seconds)

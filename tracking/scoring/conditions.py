@@ -1,5 +1,6 @@
-"""What decides a score besides the tracks: the scorer, its settings, and the truth. Only scores
-where all of it is equal are compared.
+"""What decides a score besides the tracks: the scorer, its settings, and the truth.
+
+Only scores where all of it is equal are compared.
 """
 
 from __future__ import annotations

@@ -1,15 +1,8 @@
 """All scores of a tracker against a truth: `evaluate`, and `Scorer`, which prepares one truth for many evaluations.
 
 This module decides what is compared (which frames, which similarity of people, which surface for groups). It calls the
-modules of the single scores and returns their results under the keys of the catalogue.
-
-Also here: scores of one recording as functions of weights of its frames, for intervals by resampling.
-
-Identities and matchings are those of the whole recording. The weight w(t) of frame t enters every sum: a match, a miss,
-a switch or an event of frame t counts w(t) times. So no frames are joined, and no switch or event is made by a join.
-Fixed are also the core frames and who counts for MT, PT and ML. Only IDF1, IDP, IDR and IDTP assign ids anew for each
-draw, as their definition is a best assignment. Weights of 1 give the scores of `evaluate`. Sums by frame are made once;
-each draw of weights is a matrix product.
+modules of the single scores and returns their results under the keys of the catalogue, for all frames or under weights
+of the frames (tracking.scoring.frame_weights).
 """
 
 from __future__ import annotations
@@ -26,25 +19,30 @@ from sim.types import Array, Bools, Tracks, Truth
 from tracking.grouping.foot_points import source_of
 from tracking.grouping.grouped_tracks import with_groups
 from tracking.scoring.annotated_frames import annotated_frames, seen_in
-from tracking.scoring.candidate_pairs import Pairs
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.group_and_event_scores import ComparedSides, tracked_groups
-from tracking.scoring.group_scores import GroupMatch, f1, groups_found, shared_members
+from tracking.scoring.clear import weighted_clear
+from tracking.scoring.events import compared_events, unknown_kinds, weighted_events
+from tracking.scoring.frame_weights import FrameScores, WeightedScores, mean_of_known, unweighted
+from tracking.scoring.ground_or_image import grounded, in_one_plane, plane_of
+from tracking.scoring.group_rows import TrueGroups, tracked_groups, true_groups
+from tracking.scoring.groups import GroupMatch, f1, groups_found, shared_members, weighted_groups
+from tracking.scoring.hota import hota_scores, hota_sums, weighted_hota
+from tracking.scoring.identity import weighted_identity
 from tracking.scoring.matching import mapped_people
-from tracking.scoring.people_and_groups import PersonRows, Surface, TrueGroups, tracked_people, true_groups, true_people
-from tracking.scoring.people_comparison import (
+from tracking.scoring.membership import weighted_membership
+from tracking.scoring.people import (
+    ComparedSides,
     IncomparableError,
+    PersonRows,
     Similarity,
-    grounded,
-    in_one_plane,
+    Surface,
     people_pairs,
-    plane_of,
+    tracked_people,
+    true_people,
 )
 from tracking.scoring.position_errors import weighted_positions
-from tracking.scoring.track_scores import hota_scores, hota_sums, weighted_clear, weighted_hota, weighted_identity
+from tracking.scoring.similarity import Pairs
 from tracking.scoring.unscored_tracks import left_out
-from tracking.scoring.weighted_group_scores import weighted_groups_and_events
-from tracking.scoring.weighted_sums import WeightedScores, mean_of_known, unweighted
 
 PORTION = 100  # Draws that are computed together: bounds memory.
 
@@ -159,7 +157,13 @@ class MatchedSides:
         if self.people is not None and self.hota is not None:
             parts += [weighted_people(self.people, len(sides.inside), self.hota), weighted_positions(sides)]
         if self.groups is not None:
-            parts += weighted_groups_and_events(sides, self.groups, group_match)
+            true, tracked, scores = self.groups.groups, tracked_groups(sides), FrameScores(len(sides.inside))
+            shared = shared_members(true, tracked.counted, tracked.person, len(sides.true.rows))
+            parts += [scores, *weighted_membership(scores, sides, true, tracked, shared)]
+            parts += weighted_groups(scores, sides, self.groups, tracked, shared, group_match)
+            if sides.truth.events is not None:
+                matched = [m for m in compared_events(sides, tracked) if m.kind not in unknown_kinds(sides)]
+                parts.append(weighted_events(matched, sides.truth.fps, len(sides.inside)))
 
         def score(weights: Array) -> dict[str, Array]:
             found = dict.fromkeys(CATALOGUE, np.full(len(weights), np.nan))
@@ -308,9 +312,5 @@ def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
 def weighted_people(pairs: Pairs, size: int, hota: Callable[[Array], Array]) -> WeightedScores:
     """Returns a function from weights (D, size) of frames to the scores of HOTA, CLEAR and identity, (D,) by key. size:
     length of the recording + 1. hota: as of `hota_sums`. No id may be twice in a frame."""
-    parts = [scores(pairs, size) for scores in (weighted_clear, weighted_identity)]
-
-    def score(weights: Array) -> dict[str, Array]:
-        return hota_scores(hota(weights)) | parts[0](weights) | parts[1](weights)
-
-    return score
+    clear, identity = weighted_clear(pairs, size), weighted_identity(pairs, size)
+    return lambda weights: hota_scores(hota(weights)) | clear(weights) | identity(weights)

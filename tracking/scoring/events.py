@@ -7,56 +7,32 @@ counts as merge and `dissolve` as split. Lineage: a matched merge or split is ri
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from sim.types import Array
+from tracking.scoring.annotated_frames import first_seen, widest_step
+from tracking.scoring.event_members import (
+    COUNTS_AS,
+    HEADLINE,
+    HULL_TIME,
+    KINDS,
+    ComparableEvent,
+    EventMembers,
+    events_of_hulls,
+    tracked_events,
+    true_events,
+)
+from tracking.scoring.frame_weights import F1_AND_PARTS, FrameScores, WeightedScores, mean_of_known, ratio
+from tracking.scoring.group_rows import TrackedGroups
+from tracking.scoring.people import ComparedSides
 
-KINDS = ("merge", "split", "cross", "queue", "enter", "leave")
-COUNTS_AS = {"form": "merge", "dissolve": "split"}
-HEADLINE = ("merge", "split")
 LATE = 1.0  # s: greatest difference of the starts
 ALIKE = 0.5  # least Jaccard index of the members
 NEAR = 1.5  # m: greatest distance if no members are named
 SAME_PART = 0.5  # two parts are the same if their Jaccard index exceeds this; then no other part can be the same
-
-PersonIds = frozenset[int]
-
-
-@dataclass(frozen=True, slots=True)
-class EventMembers:
-    """The members of an event, or of one group before or after it, as true people."""
-
-    people: PersonIds  # ids of true people
-    unmatched: int = 0  # number of further members that are mapped to no true person, or to one already in `people`
-
-    def jaccard(self, other: EventMembers) -> float:
-        """Returns the number of common people / the number of all members of both, 0 if both are empty. Each unmatched
-        member counts in the denominator only."""
-        common = len(self.people & other.people)
-        whole = len(self.people | other.people) + self.unmatched + other.unmatched
-        return common / whole if whole else 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class ComparableEvent:
-    """An event whose members are true people, so that a true and a tracker's event can be compared."""
-
-    kind: str  # "merge", "split", "cross", "queue", "enter", "leave", "form" or "dissolve"
-    start: int  # frame number from 1 in which the event begins
-    emitted: int | None  # frame number of the `Tracks` that report it; None in the truth
-    members: EventMembers | None  # the people concerned; None if the tracker names no people
-    pos: tuple[float, float]  # x, y, in m on the ground or px in the image; nan unknown
-    # parents, children: one `EventMembers` per group (or single person) before and after the event; None if unknown
-    parents: tuple[EventMembers, ...] | None = None
-    children: tuple[EventMembers, ...] | None = None
-
-    @property
-    def has_lineage(self) -> bool:
-        """True if parents and children are known."""
-        return self.parents is not None and self.children is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +46,28 @@ class MatchedEvents:
     est: Sequence[ComparableEvent]
     # the matched events, each (true event, tracker's event); an event is in one pair at most
     pairs: Sequence[tuple[ComparableEvent, ComparableEvent]]
+
+
+def compared_events(sides: ComparedSides, tracked: TrackedGroups) -> list[MatchedEvents]:
+    """Returns the events of the truth and of the tracker that start in labelled frames, matched, one entry per kind."""
+    truth, rows, frames, fps = sides.truth, sides.true.rows, sides.frames, sides.truth.fps
+    assert truth.events is not None
+    step, happened = widest_step(sides.inside), first_seen(truth.events, sides.inside)
+    positions = sides.true.positions_on("image", "ground") if sides.surface == "image" else None
+    true = true_events(happened, sides.true, positions, frames, step)
+    names_members = not sides.groups_only
+    est = events_of_hulls(sides.tracks, tracked.every, rows, frames, max(round(HULL_TIME * fps), step), names_members)
+    if names_members:
+        est += tracked_events(sides.tracks, sides.est, sides.mapping, rows, frames, max(round(LATE * fps), step))
+    return match_events(true, est, fps, sides.scale)
+
+
+def unknown_kinds(sides: ComparedSides) -> set[str]:
+    """Returns the kinds of events whose scores are unknown. For a tracker of whole groups they are "cross" and "queue",
+    unless it reports such an event. Else there are none."""
+    if not sides.groups_only:
+        return set()
+    return {"cross", "queue"} - {event.kind for t in sides.tracks for event in t.events}
 
 
 def match_events(
@@ -123,3 +121,36 @@ def same_lineage(true: ComparableEvent, est: ComparableEvent) -> bool:
 
 def _same_parts(true: Sequence[EventMembers], est: Sequence[EventMembers]) -> bool:
     return len(true) == len(est) and all(any(a.jaccard(b) > SAME_PART for b in est) for a in true)
+
+
+def weighted_events(matched: Sequence[MatchedEvents], fps: float, size: int) -> WeightedScores:
+    """Returns a function from weights (D, size) to the scores of events and lineage, (D,) by key."""
+    scores = FrameScores(size)
+    right, with_lineage = np.zeros(size), np.zeros(size)
+
+    def starting(events: Iterable[ComparableEvent]) -> Array:
+        return scores.column(np.array([event.start for event in events], np.int64))
+
+    for kind, true, est, pairs in ((m.kind, m.true, m.est, m.pairs) for m in matched):
+        hit = {id(event) for pair in pairs for event in pair}
+        hits, false, missed = (
+            starting(events)
+            for events in ([a for a, _ in pairs], *([e for e in side if id(e) not in hit] for side in (est, true)))
+        )
+        scores.add_f1(kind, hits + missed, hits + false, hits)
+        for key, column in {"TP": hits, "FP": false, "FN": missed}.items():
+            scores.add(f"{kind}_{key}", column)
+        late = [np.nan if b.emitted is None else (b.emitted - a.start) / fps for a, b in pairs]
+        scores.add_mean(f"{kind}_latency", np.array([a.start for a, _ in pairs], np.int64), np.array(late, float))
+        if kind in HEADLINE:
+            right += starting(a for a, b in pairs if same_lineage(a, b))
+            with_lineage += starting(a for a in true if a.has_lineage)
+    scores.add_ratio("lineage_accuracy", right, with_lineage)
+    scores.add_further(_of_merges_and_splits)
+    return scores
+
+
+def _of_merges_and_splits(found: dict[str, Array], sums: dict[str, Array]) -> dict[str, Array]:
+    late, known = (np.sum([sums[f"{kind}_latency{of}"] for kind in HEADLINE], axis=0) for of in ("", " of"))
+    means = {name: np.column_stack([found[f"{kind}_{name}"] for kind in HEADLINE]) for name in F1_AND_PARTS}
+    return {f"event_{k}": mean_of_known(values) for k, values in means.items()} | {"event_latency": ratio(late, known)}

@@ -22,8 +22,8 @@ from itertools import pairwise
 import numpy as np
 
 from sim.types import Array, Bools, Ints
-from tracking.scoring.candidate_pairs import EPS, FOUND, Pairs
 from tracking.scoring.rows import numbered
+from tracking.scoring.similarity import EPS, FOUND, Pairs
 
 CLEARLY = 1 + 1e-9  # factor by which a weight must exceed its rivals to be greater despite rounding
 WORTH = 0.2  # share of pairs that a pass must remove for another pass to be quicker than the solver

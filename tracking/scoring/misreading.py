@@ -17,8 +17,8 @@ from functools import partial
 import numpy as np
 
 from sim.types import LENGTH_UNITS, Array, Bools, Ints, Tracks, Truth
-from tracking.scoring.candidate_pairs import FOUND, box_pairs
 from tracking.scoring.rows import FrameRows
+from tracking.scoring.similarity import FOUND, box_pairs
 
 FEW = 0.2  # Share of matching boxes below which other readings are tried.
 NONE = 0.02  # Share of matching boxes below which there is a warning, whatever is found.

@@ -21,10 +21,10 @@ from collections.abc import Mapping
 import numpy as np
 
 from sim.types import Array
-from tracking.scoring.candidate_pairs import REACH, Pairs, point_pairs
-from tracking.scoring.group_and_event_scores import ComparedSides
+from tracking.scoring.frame_weights import FrameScores, WeightedScores
 from tracking.scoring.matching import match
-from tracking.scoring.weighted_sums import FrameScores, WeightedScores
+from tracking.scoring.people import ComparedSides
+from tracking.scoring.similarity import REACH, Pairs, point_pairs
 
 POWER = 2.0
 PARTS = ("GOSPA_localisation", "GOSPA_missed", "GOSPA_false")

@@ -1,5 +1,4 @@
-"""Rows of people or groups of one side (the truth or a tracker), one row per frame and id; lookups of a row by frame
-and id."""
+"""Rows of people or groups of one side (the truth or a tracker), one per frame and id; look-ups of a row by both."""
 
 from __future__ import annotations
 
@@ -11,8 +10,6 @@ import numpy as np
 
 from sim.arrays import repeated_ids
 from sim.types import Bools, Ints
-
-NO_ROWS = (0, 0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +83,7 @@ class RowLookup:
     def nearest(self, id: int, frame: int, back: int, ahead: int) -> int:
         """Returns the index of the id's row nearest to `frame`, if it lies in [frame - back, frame + ahead], else -1.
         Of two rows equally near, the earlier one is returned."""
-        low, high = self.span.get(id, NO_ROWS)
+        low, high = self.span.get(id, (0, 0))
         at = bisect_left(self.frame, frame, low, high)
         near = [k for k in (at - 1, at) if low <= k < high and -back <= self.frame[k] - frame <= ahead]
         return self.row[min(near, key=lambda k: abs(self.frame[k] - frame))] if near else -1

@@ -16,10 +16,10 @@ import numpy as np
 
 from sim.geometry.boxes import box_intersections
 from sim.types import Bools, Truth
-from tracking.scoring.candidate_pairs import EPS, box_pairs, same_frame
 from tracking.scoring.matching import mapped_people
-from tracking.scoring.people_and_groups import PersonRows
+from tracking.scoring.people import PersonRows
 from tracking.scoring.rows import FrameRows
+from tracking.scoring.similarity import EPS, box_pairs, same_frame
 
 INSIDE = 0.5  # a box is in a region if a larger share of its area is
 

@@ -19,9 +19,9 @@ from sim.types import GroupEvent, Groups, Ints, Plane, Tracks, Truth
 from tracking.grouping.grouped_tracks import derive, with_groups
 from tracking.scoring.annotated_frames import annotated_frames
 from tracking.scoring.evaluation import Scores, evaluate
-from tracking.scoring.group_scores import GroupMatch
+from tracking.scoring.groups import GroupMatch
 from tracking.scoring.misreading import likely_misreading
-from tracking.scoring.people_comparison import Similarity
+from tracking.scoring.people import Similarity
 
 # By the name of a column: shape of one row; least and greatest value, as in files. One number in a row is a whole one.
 COLUMNS: dict[str, tuple[tuple[int, ...], float, float]] = {

@@ -32,7 +32,7 @@ from scenarios.reading import parse_toml
 from scenarios.schema.scenario import Scenario, expand
 from scenarios.schema.values import Distribution, Value, bounds
 from sim.types import Array
-from tracking.running.detection_mode import PERFECT_SENSOR, SEES_ALL
+from tracking.running.truth_detections import PERFECT_SENSOR, SEES_ALL
 
 GONE: Any = object()
 EASIEST: Table = {

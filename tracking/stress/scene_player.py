@@ -20,8 +20,9 @@ from sim.store.atomic import write_file
 from sim.types import DetectionMode
 from sim.workers.calls import RemoteTraceback
 from tracking.episodes.episode import Episode, streams_for
-from tracking.episodes.episode_cache import OpenedSource, Source
+from tracking.episodes.episode_cache import OpenedSource
 from tracking.episodes.parallel_episodes import EpisodeTask, opened_sources, play_task, playing_workers, used_by
+from tracking.episodes.sources import Source
 from tracking.episodes.tuned_tracker import TunedTracker, tuned_tracker
 from tracking.oracle import oracle
 from tracking.running.detection_mode import input_kind

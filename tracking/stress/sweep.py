@@ -34,8 +34,8 @@ from scenarios.loading.toml_files import Setting
 from sim.hashing import runtime
 from sim.types import Array, DetectionMode
 from tracking.episodes.episode import streams_for
-from tracking.episodes.episode_cache import Source, sources
 from tracking.episodes.parallel_episodes import EpisodeTask, opened_sources
+from tracking.episodes.sources import Source, sources
 from tracking.episodes.tuned_tracker import TunedTracker
 from tracking.running.detection_mode import input_kind
 from tracking.stress.axes import Axis, BreakingPoint, Frontier, breaking_point, frontier

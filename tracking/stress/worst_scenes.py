@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from scenarios.loading.resolve import Entry, SuiteEntry, load, rows
-from tracking.episodes.episode_cache import Source
+from tracking.episodes.sources import Source
 from tracking.stress.sweep import Plan, Scene, Sweep, last_of_each_key
 
 if TYPE_CHECKING:

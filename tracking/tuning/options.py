@@ -11,7 +11,7 @@ from tracking.keyword_options import check_ranges, option
 
 if TYPE_CHECKING:
     from sim.types import DetectionMode, Tracker
-    from tracking.scoring.people_comparison import Similarity
+    from tracking.scoring.people import Similarity
 
 Scenes = str | Path | Sequence[str | Path]  # A suite, a scenario, a TOML file, or a list of these.
 # progress(finished, trials, text): called with the number of finished trials, the number planned (None if unknown), and

@@ -5,7 +5,8 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.scene.body import PERSON_HEIGHT
-from sim.store.track_files import WIDTH, tracks_files, upright_boxes, write_tracks
+from sim.store.track_boxes import WIDTH, upright_boxes
+from sim.store.track_files import tracks_files, write_tracks
 from sim.types import Camera
 from tests.made_up import make_tracks, same
 from tests.sealing import seal_again

@@ -450,7 +450,7 @@ ELSEWHERE = {
     # tests/tracking/recordings/test_mot_people.py
     *((name, "person_class") for name in ("coco", "score", "track", "view", "sheet", "overlay")),
     *((name, "person_class") for name in ("csv", "parquet", "trajnet", "pedpy")),
-    *((command, "box_scale") for command in ("score", "track")),  # tests/tracking/recordings/test_box_columns.py
+    *((command, "box_scale") for command in ("score", "track")),  # tests/tracking/recordings/test_track_texts.py
 }
 # Commands whose options are tested one by one in commands/, ../stress, ../errors, and test_*.py here.
 OWN = (

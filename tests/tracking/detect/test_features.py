@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sim.scene.camera import project, project_pair
-from tests.sim.scene.test_stereo import rig
+from tests.sim.scene.test_camera_stereo import rig
 from tracking.detect.features import Features, SpacePoints, slopes
 
 FPS, D = 30.0, 6.0

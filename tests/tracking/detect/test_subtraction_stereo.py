@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sim.scene.camera import project_pair
-from tests.sim.scene.test_stereo import rig
+from tests.sim.scene.test_camera_stereo import rig
 from tracking.detect import blobs
 from tracking.detect.subtraction_stereo import LEAST_UNIQUE, MULTIPLE, SubtractionStereo, sampled
 from tracking.papers.stereo.person_regions import LEAST_HEIGHT, person_mask, sizes

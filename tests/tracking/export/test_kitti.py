@@ -13,7 +13,7 @@ from sim.scene.camera import project_pair
 from sim.store import sequence_folder
 from sim.streams import decode_disparity
 from tests.made_up import make_pictured
-from tests.sim.scene.test_stereo import rig
+from tests.sim.scene.test_camera_stereo import rig
 from tracking.export.kitti import calibration, kitti
 
 

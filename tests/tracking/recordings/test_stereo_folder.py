@@ -8,7 +8,7 @@ import pytest
 
 from scenarios.errors import InputError
 from tests.recordings import mot_folder
-from tests.sim.scene.test_stereo import rig
+from tests.sim.scene.test_camera_stereo import rig
 from tracking.recordings.calibration import read_calibration
 from tracking.recordings.source import open_source
 from tracking.running.run import track

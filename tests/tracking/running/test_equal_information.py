@@ -17,9 +17,11 @@ from sim.types import Detections, Frame, Sequence, Tracks
 from tests.tracking.running.test_run import Stranger
 from tracking.oracle import named_detections, oracle
 from tracking.recordings.source import open_source
-from tracking.running.detection_mode import as_needed, from_truth, given_detections
+from tracking.running.detection_mode import Given, as_needed, given_detections
 from tracking.running.prepare import prepare
-from tracking.running.run import input_name, track
+from tracking.running.run import track
+from tracking.running.run_info import input_name
+from tracking.running.truth_detections import from_truth
 from tracking.scoring import evaluate
 
 
@@ -149,7 +151,7 @@ def test_labels_that_are_degraded_tell_whose_they_are() -> None:
     assert truth is not None
     assert truth.pos is not None
     for sensor in ({}, {"clutter_rate": 3.0, "noise_m": 0.0}):
-        given = from_truth(sequence, sensor, 5)
+        given = Given(*from_truth(sequence, sensor, 5))
         assert given.owners is not None
         for d, who in zip(given.detections, given.owners, strict=True):
             assert d is not None

@@ -1,4 +1,4 @@
-"""Which detections a tracker gets; those made from labels tell nothing by their order or their arrays."""
+"""Detections made from labels tell nothing by their order or their arrays."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
-from sim.types import Detections, Sequence
+from sim.types import Sequence
 from tests.tracking.running.test_run import Stranger
-from tracking.running.detection_mode import check_detections, choose_mode, from_truth
 from tracking.running.prepare import prepare
 from tracking.running.run import track
+from tracking.running.truth_detections import from_truth
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +33,7 @@ class Writing(Stranger):
 
 
 def test_the_order_depends_on_seed_and_frame_alone(merge):
-    first, again, other = (from_truth(merge, {}, seed).detections for seed in (3, 3, 4))
+    first, again, other = (from_truth(merge, {}, seed)[0] for seed in (3, 3, 4))
     assert all(np.array_equal(a.pos, b.pos) for a, b in zip(first, again, strict=True))
     assert not all(np.array_equal(a.pos, b.pos) for a, b in zip(first, other, strict=True))
     for index, found in enumerate(first, 1):
@@ -64,54 +64,10 @@ def test_what_a_tracker_writes_reaches_neither_truth_nor_the_next_run(merge, mod
     assert all(np.array_equal(a.pos, b.pos) for a, b in zip(clean, again, strict=True))
 
 
-def source(**has):
-    return Sequence("s", 10.0, 1, lambda: iter(()), **has)
-
-
-DEFAULT_MODES = [
-    (("boxes",), {"has_detections": True, "load_truth": lambda: None}, "file"),
-    (("boxes",), {"has_images": True, "load_truth": lambda: None}, "truth"),
-    (("pixels", "boxes"), {"has_images": True, "has_detections": True}, "image"),
-    (("pixels", "boxes"), {"has_detections": True}, "file"),
-    (("stereo", "points"), {"has_images": True, "load_truth": lambda: None}, "truth"),
-    (("stereo",), {"has_images": True, "has_right": True}, "image"),
-]
-
-
-@pytest.mark.parametrize(("needs", "has", "expected"), DEFAULT_MODES)
-def test_default_mode(needs, has, expected):
-    assert choose_mode(needs, source(**has), None) == expected
-
-
-IMPOSSIBLE_MODES = [
-    (("boxes",), {"has_images": True}, None),
-    (("boxes",), {"has_detections": True}, "truth"),
-    (("boxes",), {"has_images": True, "has_detections": True}, "image"),
-    (("stereo",), {"has_images": True, "load_truth": lambda: None}, None),
-]
-
-
-@pytest.mark.parametrize(("needs", "has", "asked"), IMPOSSIBLE_MODES)
-def test_what_cannot_work_names_both_sides(needs, has, asked):
-    with pytest.raises(InputError) as caught:
-        choose_mode(needs, source(**has), asked)
-    assert needs[0] in str(caught.value)
-    assert "images" in str(caught.value) or "detections" in str(caught.value)
-
-
-def test_nan_names_frame_and_row():
-    box = np.ones((3, 4))
-    box[1, 2] = np.nan
-    with pytest.raises(InputError, match="frame 7: detection 2"):
-        check_detections(Detections(7, 0.6, "image", np.ones((3, 2)), None, box, np.ones(3)), ("boxes",))
-    with pytest.raises(InputError, match="got points; expected boxes"):
-        check_detections(Detections(7, 0.6, "ground", np.ones((3, 2))), ("boxes",))
-
-
 def test_settings_with_dots_are_keys_of_a_table(merge):
     """One key of box_noise brings its defaults; without any, boxes are exact."""
     exact, whole, dotted = (
-        [d.box for d in from_truth(merge, sensor, 0).detections]
+        [d.box for d in from_truth(merge, sensor, 0)[0]]
         for sensor in ({"noise_m": 0.1}, {"box_noise": {"scale": 2.0}}, {"box_noise.scale": 2.0})
     )
     assert all(map(np.array_equal, whole, dotted))

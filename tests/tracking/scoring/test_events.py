@@ -10,9 +10,9 @@ import pytest
 from tests.hand_made import Scene, event, tracks, truth
 from tests.reference_social import event_hits
 from tracking.scoring import evaluate
-from tracking.scoring.events import ComparableEvent, EventMembers, match_events
-from tracking.scoring.weighted_group_scores import weighted_events
-from tracking.scoring.weighted_sums import unweighted
+from tracking.scoring.event_members import ComparableEvent, EventMembers
+from tracking.scoring.events import match_events, weighted_events
+from tracking.scoring.frame_weights import unweighted
 
 FRAMES = 60
 CROWD = {p: (4.0 * p, 0.0) for p in range(1, 9)}  # far apart: everybody is who they are

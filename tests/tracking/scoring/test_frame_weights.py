@@ -17,7 +17,7 @@ from tracking import track
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scorer
-from tracking.scoring.weighted_sums import FrameScores
+from tracking.scoring.frame_weights import FrameScores
 
 TWO = {1: (0.0, 0.0), 2: (1.0, 0.0)}
 PAIR = {1: ((1, 2), None)}

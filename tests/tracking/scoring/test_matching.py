@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
 from tests.matrix_pairs import matrix_pairs
-from tracking.scoring.candidate_pairs import Pairs, point_pairs
 from tracking.scoring.matching import mapped_people, match, match_as_table
 from tracking.scoring.rows import FrameRows
+from tracking.scoring.similarity import Pairs, point_pairs
 
 EIGHTHS = st.sampled_from([0.0, 0.0, 0.0, 0.125, 0.25, 0.5, 0.5, 0.625, 1.0, 1.0])  # ties, and sums that tie
 ANY = st.one_of(EIGHTHS, st.floats(0, 1, allow_subnormal=False))

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 
 from sim.types import Truth
-from tracking.scoring.candidate_pairs import Pairs, point_pairs
-from tracking.scoring.group_and_event_scores import ComparedSides
-from tracking.scoring.people_and_groups import PersonRows
+from tracking.scoring.frame_weights import unweighted
+from tracking.scoring.people import ComparedSides, PersonRows
 from tracking.scoring.position_errors import PARTS, gospa_of, gospa_parts, weighted_positions
 from tracking.scoring.rows import FrameRows
-from tracking.scoring.weighted_sums import unweighted
+from tracking.scoring.similarity import Pairs, point_pairs
 
 
 def rows(*counts: int) -> FrameRows:

@@ -10,7 +10,7 @@ from sim.sequence import simulate
 from sim.types import Truth
 from tracking import track
 from tracking.scoring import evaluate, score_arrays
-from tracking.scoring.people_comparison import IncomparableError
+from tracking.scoring.people import IncomparableError
 
 ROWS = {"frame": [1, 1, 2, 2], "id": [1, 2, 1, 2], "pos": [[0, 0], [1, 0], [0, 0], [1, 0]], "group": [7, 7, 7, 7]}
 

@@ -10,8 +10,8 @@ import tracking
 from scenarios.errors import InputError
 from tests.processes import FAKE
 from tests.tuning_toys import TOY, write_scenes
-from tracking.episodes.episode_cache import sources
 from tracking.episodes.parallel_episodes import EpisodeTask
+from tracking.episodes.sources import sources
 from tracking.stress.scene_player import ORACLE, OracleTask, contender, play_scene, scene_player
 
 RAISING = """

@@ -154,7 +154,7 @@ def test_a_constant_of_the_scorer_and_the_version_of_numpy_in_a_copy(folder: Pat
     for name in hashing.PACKAGES:
         source = Path(hashing.__file__).parents[1] / name
         shutil.copytree(source, folder / "copy" / name, ignore=shutil.ignore_patterns("__pycache__"))
-    constants = folder / "copy" / "tracking" / "scoring" / "people_comparison.py"
+    constants = folder / "copy" / "tracking" / "scoring" / "ground_or_image.py"
     monkeypatch.setattr(hashing, "__file__", str(folder / "copy" / "sim" / "hashing.py"))
     monkeypatch.setattr(hashing, "versions", hashing.versions.__wrapped__)
 

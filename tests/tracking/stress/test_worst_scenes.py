@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from tests.tracking.stress.test_stress import sweep_of
+from tests.tracking.stress.test_sweep import sweep_of
 from tracking.episodes.parallel_episodes import EpisodeTask
 from tracking.stress.axes import parse_axes
 from tracking.stress.scene_player import Outcome, Tasks

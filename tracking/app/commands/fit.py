@@ -54,7 +54,8 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
 def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     """Writes the belief fitted to simulated scenes as a TOML file, with the command and its scores as comments."""
     from sim.store.atomic import write_file
-    from tracking.fitting.belief import belief_scores, fit_belief, sample_of
+    from tracking.fitting.belief import fit_belief, sample_of
+    from tracking.fitting.belief_scores import belief_scores
     from tracking.fitting.grouping_scenes import pair_scenes
 
     out, seeds = output_file(options.out, ".toml"), option_parsing.seeds(options.seeds)

@@ -26,7 +26,8 @@ from tracking.app.tracker_setup import TrackerSetup
 from tracking.config import Config
 from tracking.grouping.grouping_choice import grouping_of
 from tracking.running.detection_mode import choose_mode
-from tracking.running.run import TrackingRun, input_summary
+from tracking.running.run import TrackingRun
+from tracking.running.run_info import input_summary
 from tracking.running.time_limit import TimeLimited
 from tracking.running.tracker_registry import find
 

@@ -10,10 +10,10 @@ from math import erf
 
 import numpy as np
 
+from sim.compiler import njit
 from sim.types import Array, Bools, Ints
 from tracking.filters.existence import FALSE, SHOWN
 from tracking.filters.kalman import RATE, VAR
-from tracking.papers.blob.person_template_kernels import kernel
 
 LIKELY = 0.5  # least probability of a confirmed track, and of a reported box
 BODY = 0.35  # m: a box is right if its middle is so near to the person
@@ -22,7 +22,7 @@ FARTHEST = 9.0  # standard deviations from which a density is taken as 0: it is 
 DOUBLE_SPREAD = 0.3  # m: standard deviation of centre, height and width of a second box of a person
 
 
-@kernel
+@njit(cache=True)
 def covered_share(box: Array, other: Array) -> float:
     """Returns the share, 0 to 1, of a box (4,) that lies in another box (4,)."""
     wide = min(box[0] + box[3] / 2, other[0] + other[3] / 2) - max(box[0] - box[3] / 2, other[0] - other[3] / 2)
@@ -30,7 +30,7 @@ def covered_share(box: Array, other: Array) -> float:
     return float(max(wide, 0.0) * max(high, 0.0) / max(box[2] * box[3], 1e-9))
 
 
-@kernel
+@njit(cache=True)
 def covered_shares(boxes: Array, others: Array) -> Array:
     """Returns the share (N, M), 0 to 1, of each of the boxes (N, 4) that lies in each of the others (M, 4)."""
     share = np.empty((len(boxes), len(others)))
@@ -40,13 +40,13 @@ def covered_shares(boxes: Array, others: Array) -> Array:
     return share
 
 
-@kernel
+@njit(cache=True)
 def well_placed(var: float) -> float:
     """Returns the probability that the middle of a box is right; var: variance of its x, m^2."""
     return erf(BODY / np.sqrt(2 * var))
 
 
-@kernel
+@njit(cache=True)
 def visible_shares(boxes: Array, scale: Array, existence: Array, var: Array) -> Array:
     """Returns the share (N,) of each of the boxes (N, 4) that no person in front covers, as far as places are known.
 
@@ -64,7 +64,7 @@ def visible_shares(boxes: Array, scale: Array, existence: Array, var: Array) -> 
     return share
 
 
-@kernel
+@njit(cache=True)
 def pair_costs(rows: Ints, evidence: Array, ratio: Array, new: float, detectable: Array, states: Array) -> Array:
     """Returns ln p(missed, box is nobody's) - ln p(measured) of P pairs of tracks `rows` and boxes, (P,).
 
@@ -79,7 +79,7 @@ def pair_costs(rows: Ints, evidence: Array, ratio: Array, new: float, detectable
     return cost
 
 
-@kernel
+@njit(cache=True)
 def add_doubles(total: Array, boxes: Array, owners: Array, scale: Array, owned: Array, earlier: bool) -> None:
     """Adds to `total` (M,), in place, the sum over the owners (N, 4) of owned (N,) exp(-d^2 / 2) / scale (N,)^2.
 
@@ -97,7 +97,7 @@ def add_doubles(total: Array, boxes: Array, owners: Array, scale: Array, owned: 
                     total[i] += owned[j] / scale[j] ** 2 * np.exp(-0.5 * d2)
 
 
-@kernel
+@njit(cache=True)
 def reported(boxes: Array, bank: Array, existence: Array, measured: Bools, view: Array) -> Bools:
     """Returns flags (N,): True if a person's box is right with the probability LIKELY, and not leaving the field of
     view, from x, y view[0] to view[1], px, while missed."""
@@ -111,7 +111,7 @@ def reported(boxes: Array, bank: Array, existence: Array, measured: Bools, view:
     return shown
 
 
-@kernel
+@njit(cache=True)
 def image_covariance(bank: Array, scale: Array) -> Array:
     """Returns the covariances (N, 4, 4) of x, y, vx, vy, px and px/s, of filters; scale (N,): px per m."""
     cov = np.zeros((len(scale), 4, 4))

@@ -14,7 +14,7 @@ from sim.types import Context, Detections, Frame, Plane, Tracks
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.track_management import TrackedEllipses, TrackedPeople
+from tracking.papers.blob.track_management import TrackedPeople
 from tracking.papers.blob.track_management_kernels import image_covariance
 from tracking.papers.blob.update_from_boxes import BoxUpdater
 
@@ -54,6 +54,7 @@ class Blob:
             self.people = TrackedPeople(c, dynamics, context)
             self.updater = BoxUpdater(c, self.people)
         else:
+            from tracking.papers.blob.ellipse_tracks import TrackedEllipses
             from tracking.papers.blob.update_from_pixels import PixelUpdater
 
             people = TrackedEllipses(c, dynamics, context)

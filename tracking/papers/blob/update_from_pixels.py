@@ -33,8 +33,8 @@ from tracking.filters import kalman
 from tracking.papers.blob import box_geometry, person_look_kernels, person_template, person_template_search_kernels
 from tracking.papers.blob import person_template_kernels as kernels
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
+from tracking.papers.blob.ellipse_tracks import TrackedEllipses
 from tracking.papers.blob.person_look_kernels import LEARN_SHOWN, LOOK_TIME
-from tracking.papers.blob.track_management import TrackedEllipses
 from tracking.papers.blob.track_management_kernels import covered_shares
 from tracking.running import image_scale
 

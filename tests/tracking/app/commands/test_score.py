@@ -20,7 +20,7 @@ from tracking.app.cli import run
 from tracking.running.run import TrackingRun
 from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.scoring.people_comparison import in_one_plane
+from tracking.scoring.ground_or_image import in_one_plane
 from tracking.stats import mean_interval
 
 SLOW = ["camera.fps=5"]

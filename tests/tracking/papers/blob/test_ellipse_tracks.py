@@ -9,7 +9,7 @@ from sim.scene.camera import camera_rotation
 from sim.types import Camera, Context
 from tracking.filters import kalman
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.track_management import TrackedEllipses
+from tracking.papers.blob.ellipse_tracks import TrackedEllipses
 from tracking.papers.blob.track_management_kernels import visible_shares
 
 FPS, SCALE = 10.0, 40.0

@@ -13,7 +13,7 @@ from sim.sequence import simulate
 from sim.types import Context, Frame
 from tests.point_frames import detections, stepped
 from tests.reference_relational import drawn, relate, relations
-from tests.tracking.papers.relational.test_particle_weights import sight
+from tests.tracking.papers.relational.test_particle_set import sight
 from tracking.filters.person_streams import birth_keys
 from tracking.grouping.belief import UNSEEN
 from tracking.papers.relational import particle_set, sensor, transition_kernels

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sim.types import Context
-from tests.sim.scene.test_stereo import rig
+from tests.sim.scene.test_camera_stereo import rig
 from tracking.papers.stereo.config import StereoConfig
 from tracking.papers.stereo.picture_points import PicturePoints
 

@@ -12,7 +12,7 @@ from scenarios.errors import InputError
 from sim.scene.camera import project
 from sim.types import Context, Frame, Groups, Tracks
 from tests.reference_polygons import contains
-from tests.sim.scene.test_stereo import rig
+from tests.sim.scene.test_camera_stereo import rig
 from tracking.detect.features import SpacePoints
 from tracking.papers.stereo import space_group
 from tracking.papers.stereo.config import StereoConfig

@@ -1,7 +1,6 @@
-"""How the people of a truth and of a tracker are compared: by boxes, or by positions on the ground or in the image.
+"""Where a truth and the tracks of any number of runs are compared: on the ground, or in the image.
 
-Also here: what is compared: a property of the data, so that the scores of any number of runs can be laid side by side.
-
+This is a property of the data, so that the scores of any number of runs can be laid side by side.
 Calibrated data (positions on the ground, or boxes and a camera) are compared on the ground, with the true positions if
 they are known. Boxes are moved to where the bodies stand that have them (`sim.scene.standing`).
 Other data are compared by overlap of boxes if everybody has one, else by position in the image. Tracks from pixels are
@@ -12,56 +11,21 @@ compared in the image.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Literal
 
 import numpy as np
 
 from sim.scene.standing import standing_points
 from sim.truth.group_hulls import groups_over_time
-from sim.types import Array, Tracks, Truth
+from sim.types import Tracks, Truth
 from tracking.grouping.foot_points import boxed, can_stand, completed, moved_events, standing
 from tracking.grouping.grouped_tracks import groups_in_frames
-from tracking.scoring.candidate_pairs import REACH, Pairs, box_pairs, point_pairs
-from tracking.scoring.group_and_event_scores import ComparedSides
-from tracking.scoring.people_and_groups import PersonRows, Surface
-
-# How two people are compared: IoU of boxes, or distance of positions on the ground or in the image.
-Similarity = Literal["boxes", "ground", "image"]
-
-
-class IncomparableError(ValueError):
-    """Raised if the truth or the tracks have people but lack the boxes or positions that are to be compared."""
+from tracking.scoring.people import IncomparableError, Similarity
 
 
 def plane_of(truth: Truth, tracks: Sequence[Tracks]) -> str:
     """Returns the plane of one tracker's positions: "ground", "space" or "image"; without `Tracks`, the truth's."""
     own = "image" if truth.pos is None else "ground"
     return next((t.plane for t in tracks if len(t.id)), tracks[0].plane if tracks else own)
-
-
-def people_pairs(sides: ComparedSides, similarity: Similarity) -> Pairs:
-    """Returns the candidate pairs of a true and a tracked person of one frame, with their similarity. Raises
-    IncomparableError if the boxes, positions or image scale that the similarity needs are missing."""
-    true, est = sides.true, sides.est
-    if similarity == "boxes":
-        if true.box is None or est.box is None:
-            raise IncomparableError("no boxes to compare: score on the ground")
-        return box_pairs(true.rows, est.rows, true.box, est.box)
-    scale = sides.truth.px_per_m if similarity == "image" else 1.0
-    if not 0 < scale < np.inf:
-        if len(true.rows) and len(est.rows):
-            raise IncomparableError(f"no image scale to compare positions by, px_per_m is {scale:g}: state it")
-        scale = 1.0
-    true_pos, est_pos = _positions(true, similarity, "ground"), _positions(est, similarity, sides.plane)
-    return point_pairs(true.rows, est.rows, true_pos, est_pos, REACH * scale)
-
-
-def _positions(people: PersonRows, surface: Surface, plane: str) -> Array:
-    positions = people.positions_on(surface, plane)
-    if positions is None and len(people.rows):
-        where = "on the ground" if surface == "ground" else "in the image"
-        raise IncomparableError(f"no positions {where} to compare: choose another similarity")
-    return np.zeros((0, 2)) if positions is None else positions
 
 
 def grounded(truth: Truth) -> Truth:

@@ -8,8 +8,8 @@ import pytest
 from tests.matrix_pairs import matrix_pairs
 from tests.reference_trackeval import trackeval_scores
 from tracking.scoring.evaluation import weighted_people
-from tracking.scoring.track_scores import hota_sums
-from tracking.scoring.weighted_sums import unweighted
+from tracking.scoring.frame_weights import unweighted
+from tracking.scoring.hota import hota_sums
 
 SEEDS = range(15)
 

@@ -4,7 +4,7 @@ import signal
 
 import pytest
 
-from tests.tracking.running.test_user_code import command
+from tests.tracking.test_user_code import command
 from tracking.app.cli import run
 from tracking.user_code import raise_if_interrupted, recorded_interrupts
 

@@ -10,8 +10,8 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
-from tracking.episodes.episode_cache import Source
 from tracking.episodes.parallel_episodes import EpisodeTask
+from tracking.episodes.sources import Source
 from tracking.episodes.tuned_tracker import TunedTracker
 from tracking.stress.axes import AXES, NEVER, breaking_point, crossing, frontier, parse_axes, parse_axis, shares
 from tracking.stress.scene_player import Outcome, Store, Tasks

@@ -1,51 +1,23 @@
-"""People and groups of the truth or of a tracker as rows of arrays, all frames together.
+"""The groups of the truth and of a tracker as rows of arrays, all frames together, and which people are their members.
 
-`true_people`, `tracked_people` and `group_rows` build the rows from `Truth`, `Tracks` and `Groups`. `people_inside`
-finds the members of groups that are reported as hulls only.
+`true_groups` and `tracked_groups` build the rows. Members of a group that is reported as a hull only are the people
+inside the hull.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 
 from sim.geometry.polygons import edge_distance_pairs, gap_pairs, pack, pack_padded
-from sim.types import Array, Bools, Groups, Ints, Tracks, Truth
-from tracking.scoring.candidate_pairs import compare
+from sim.types import Array, Bools, Groups, Ints, Truth
+from tracking.scoring.people import ComparedSides, Surface
 from tracking.scoring.rows import FrameRows, find_rows
-
-Surface = Literal["ground", "image"]  # Where groups are compared: on the ground in m, or in the image in px.
+from tracking.scoring.similarity import compare
 
 INSIDE = 0.3  # m: a person at most this far from a hull is a member, where a tracker names no members
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PersonRows:
-    """R rows, one per person and frame, sorted by frame."""
-
-    rows: FrameRows  # frame number and id of each row
-    group: Ints  # (R,): group id, -1 alone
-    # pos (R, 2), vel (R, 2): x, y of position and velocity in the plane of this side's data, m and m/s or px and px/s.
-    # nan unknown.
-    pos: Array | None
-    vel: Array | None
-    box: Array | None  # (R, 4): left, top, width, height in px.
-
-    def keep(self, mask: Bools | slice) -> PersonRows:
-        """Returns the rows that a bool mask (R,) or a slice selects, with all their columns."""
-        pos, vel, box = (None if a is None else a[mask] for a in (self.pos, self.vel, self.box))
-        return PersonRows(self.rows.keep(mask), self.group[mask], pos, vel, box)
-
-    def positions_on(self, surface: Surface, plane: str) -> Array | None:
-        """Returns the positions (R, 2) on a surface, in m on the "ground" or px in the "image"; None if unknown there.
-        plane: the plane of `pos`. In the image the centre of the box is preferred to `pos`."""
-        if surface == "image" and self.box is not None:
-            return self.box[:, :2] + self.box[:, 2:] / 2
-        own = "image" if plane == "image" else "ground"
-        return self.pos if own == surface else None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -76,28 +48,6 @@ class GroupRows:
             tuple(h for h, k in zip(self.hull, mask.tolist(), strict=True) if k),
             place[self.of[kept]], self.member[kept],
         )  # fmt: skip
-
-
-def true_people(truth: Truth, frames: Bools) -> PersonRows:
-    """Returns the truth's people in the frames f where frames[f] is true, sorted by frame."""
-    every = PersonRows(FrameRows(truth.frame, truth.id), truth.group, truth.pos, truth.vel, truth.box)
-    return every.keep(frames[truth.frame])
-
-
-def tracked_people(tracks: Sequence[Tracks]) -> PersonRows:
-    """Returns one tracker's people as rows; `tracks` are sorted by frame. `box` of the result is None if in any frame
-    with people the boxes are missing."""
-    count = [len(t.id) for t in tracks]
-    frame = np.repeat(np.array([t.index for t in tracks], np.int64), count)
-    none = np.zeros(0, np.int64)
-    id, group = (np.concatenate([none, *(getattr(t, name) for t in tracks)]) for name in ("id", "group"))
-    pos, vel = (
-        np.concatenate([np.zeros((0, 2)), *(getattr(t, name)[:, :2] for t in tracks)]) for name in ("pos", "vel")
-    )
-    boxes = [t.box for t in tracks if len(t.id)]
-    boxed = [b for b in boxes if b is not None]
-    box = np.concatenate([np.zeros((0, 4)), *boxed]) if len(boxed) == len(boxes) else None
-    return PersonRows(FrameRows(frame, id), group, pos, vel, box)
 
 
 def group_rows(frames: Ints, groups: Sequence[Groups], people: FrameRows) -> GroupRows:
@@ -171,3 +121,47 @@ def people_inside(groups: GroupRows, people: FrameRows, positions: Array, scale:
 
     members = compare(groups.rows, people, inside)
     return replace(groups, of=members.i, member=members.j)
+
+
+@dataclass(frozen=True, eq=False)
+class TrackedGroups:
+    """One tracker's groups in the labelled frames."""
+
+    # all groups; memberships hold rows of the true people. Members mapped to nobody are left out. If the tracker names
+    # no members, they are the true people inside the hull.
+    every: GroupRows
+    # the groups that are scored. Members are rows of the tracked people if the tracker names members, else rows of the
+    # true people inside the hull.
+    counted: GroupRows
+    person: Ints  # (K,): for each of the K memberships of `counted`, the row of the true person, -1 none
+    named: bool  # True if the tracker names members, or follows people and has no groups
+    known: bool = True  # False if the tracker names no members, and who is inside its hulls is unknown
+
+
+def tracked_groups(sides: ComparedSides) -> TrackedGroups:
+    """Returns the tracker's groups in labelled frames, and which of them are scored.
+
+    If the tracker names members, its groups of two or more members are scored. Otherwise the members of a group are the
+    true people inside its hull or at most 0.3 m outside. Then a hull with exactly one person is not scored; a hull with
+    nobody is scored, as a false group.
+    """
+    tracks = [t for t in sides.tracks if sides.frames[t.index]]
+    frames = np.array([t.index for t in tracks], np.int64)
+    every = group_rows(frames, [t.groups or Groups.none() for t in tracks], sides.est.rows)
+    wholes = any(t.unit == "group" for t in tracks)
+    if wholes or not len(every.of):
+        positions = sides.true.positions_on(sides.surface, "ground")
+        known = positions is not None and bool(np.isfinite(sides.scale))
+        if positions is not None and known:
+            every = people_inside(every, sides.true.rows, positions, sides.scale)
+        # a person alone is no group; a hull with nobody inside is a false one
+        counted = every.keep(every.count != 1)
+        return TrackedGroups(every, counted, counted.member, not (wholes or len(every)), known or not len(every))
+    counted = every.keep(every.count > 1)
+    person = _true_rows(every, sides.mapping)
+    mapped = replace(every, of=every.of[person >= 0], member=person[person >= 0])
+    return TrackedGroups(mapped, counted, _true_rows(counted, sides.mapping), named=True)
+
+
+def _true_rows(groups: GroupRows, mapping: Ints) -> Ints:
+    return np.where(groups.member >= 0, np.append(mapping, -1)[groups.member], -1)

@@ -1,7 +1,12 @@
-"""Scores as functions of weights of the frames of one recording, for D draws of weights at once.
+"""Scores as functions of weights of the frames of one recording, for intervals by resampling.
 
-Weights are arrays (D, size) by frame number from 0, size being the length of the recording + 1. Weights of 1 give the
-scores of the recording.
+Weights are arrays (D, size), D draws by frame number from 0, size being the length of the recording + 1. Weights of 1
+give the scores of the recording. Sums by frame are made once; each draw of weights is a matrix product.
+
+Identities and matchings are those of the whole recording. The weight w(t) of frame t enters every sum: a match, a miss,
+a switch or an event of frame t counts w(t) times. So no frames are joined, and no switch or event is made by a join.
+Fixed are also the core frames and who counts for MT, PT and ML. Only IDF1, IDP, IDR and IDTP assign ids anew for each
+draw, as their definition is a best assignment.
 """
 
 from __future__ import annotations

@@ -7,7 +7,7 @@ import pytest
 from filterpy.kalman import KalmanFilter
 
 from sim.scene.camera import back_project, point_covariances, project_pair
-from tests.sim.scene.test_stereo import rig
+from tests.sim.scene.test_camera_stereo import rig
 from tracking.detect.features import SpacePoints
 from tracking.papers.stereo import space_group
 from tracking.papers.stereo.config import StereoConfig

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tests.reference_trackeval import box_similarity
-from tracking.scoring import candidate_pairs as module
-from tracking.scoring.candidate_pairs import Pairs, box_pairs, point_pairs
+from tracking.scoring import similarity as module
 from tracking.scoring.rows import FrameRows, RowLookup
+from tracking.scoring.similarity import Pairs, box_pairs, point_pairs
 
 
 def random_rows(r: np.random.Generator, frames: int = 12, most: int = 9) -> FrameRows:

@@ -10,7 +10,8 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
-from tracking.episodes.episode import play, sources
+from tracking.episodes.episode import play
+from tracking.episodes.sources import sources
 
 
 def test_a_suite_with_seeds_in_order():

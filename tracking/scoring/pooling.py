@@ -8,7 +8,7 @@ import numpy as np
 
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scores
-from tracking.scoring.track_scores import hota_scores
+from tracking.scoring.hota import hota_scores
 
 COUNTS = ("TP", "FN", "FP", "IDSW", "MT", "PT", "ML", "Frag", "IDTP")  # Scores that add up over sequences.
 

@@ -1,12 +1,12 @@
-"""Groups matched one to one in every frame, by hulls or by members, and what their scores count.
+"""Scores of groups that are matched one to one in every frame, by hulls or by members.
 
 A true group is *found* (`groups_found`) if an estimated group has more than half of the people of both in common. This
 needs no matching: of two true groups, which share nobody, at most one has more than half of an estimated group.
 
 Detection follows Bazzani, Cristani & Murino (2012), "Decentralized Particle Filter for Joint Individual-Group
 Tracking": 1-FP and 1-FN (1 - false or missed / true groups), GDSR (share of true groups whose match holds 60 % of their
-members). MOTP (mean distance of centres) and MOTA follow Bernardin & Stiefelhagen (2008). Sums run over labelled
-frames (weighted_group_scores.py).
+members). MOTP (mean distance of centres) and MOTA follow Bernardin & Stiefelhagen (2008), HOTA of groups is that of
+`hota`. Scores come twice: strict (all labelled frames) and core (without frames up to 1 s from a true merge or split).
 """
 
 from __future__ import annotations
@@ -17,14 +17,19 @@ from typing import Literal
 import numpy as np
 
 from sim.geometry.polygons import iou_pairs, pack
-from sim.types import Array, Bools, Ints
-from tracking.scoring.candidate_pairs import EPS, Pairs, compare
+from sim.types import Array, Bools, Ints, Truth
+from tracking.scoring.event_members import CHANGES
+from tracking.scoring.frame_weights import FrameScores, WeightedScores
+from tracking.scoring.group_rows import GroupRows, TrackedGroups, TrueGroups
+from tracking.scoring.hota import weighted_hota
 from tracking.scoring.matching import match
-from tracking.scoring.people_and_groups import GroupRows
+from tracking.scoring.people import ComparedSides
+from tracking.scoring.similarity import EPS, FOUND, Pairs, compare
 
 GroupMatch = Literal["hull", "members"]
 CORRECT = (3, 5)  # 3/5 of the members must be common for a group to be correct; integers avoid rounding
 TIE = 1e-9  # weight of closeness in a matching: decides between equal similarities only
+CORE = 1.0  # s around the start of each true merge or split that the core scores leave out
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -122,3 +127,76 @@ def switch_frames(frame: Ints, true: Ints, est: Ints) -> Ints:
 def f1(hits: int, n_true: int, n_est: int) -> float:
     """Returns 2 hits / (n_true + n_est), nan if both are 0; hits: matches, n_true, n_est: number on each side."""
     return 2 * hits / (n_true + n_est) if n_true + n_est else float("nan")
+
+
+def near_changes(truth: Truth) -> Bools:
+    """Returns which of the frame numbers 0 … length are at most 1 s from the start of a true merge or split. The result
+    is bool, (length + 1,). `form` counts as a merge and `dissolve` as a split."""
+    starts = np.array([e.start for e in truth.events or () if e.kind in CHANGES], float)
+    away = np.abs(np.arange(truth.length + 1)[:, None] - starts).min(axis=1, initial=np.inf)
+    return np.asarray(away <= CORE * truth.fps + 1e-9)
+
+
+def weighted_groups(
+    scores: FrameScores, sides: ComparedSides, true: TrueGroups, tracked: TrackedGroups, shared: SharedMembers,
+    by: GroupMatch,
+) -> list[WeightedScores]:  # fmt: skip
+    """Adds F1 of groups to `scores`, and returns functions from weights (D, size) to the others, (D,) by key.
+
+    by: matches groups by "hull" (IoU) or by "members" (Jaccard index). The keys are those of the catalogue. Keys with
+    "_core" leave out frames up to 1 s from the start of a true merge or split. Keys are missing where the truth or the
+    tracker lacks data.
+    """
+    core = sides.frames & ~near_changes(sides.truth)
+    groups, est = true.groups, tracked.counted
+    n, m = (scores.column(side.rows.frame, within=sides.frames) for side in (groups, est))
+    hulls = hull_pairs(groups, est) if true.comparable else None
+    pairs = hulls if by == "hull" else member_pairs(groups, est, shared) if tracked.known else None
+    parts: list[WeightedScores] = []
+    if tracked.known:
+        found = groups.rows.frame[groups_found(groups, est, shared)]
+        scores.add_f1("group", n, m, scores.column(found, within=sides.frames))
+        scores.add_f1("group", n * core, m * core, scores.column(found, within=core), "_core")
+    if hulls is not None:
+        overlapping = matched_groups(groups.pos, est.pos, hulls, FOUND).frame
+        scores.add_ratio("group_F1_hull", 2 * scores.column(overlapping, within=sides.frames), n + m)
+    if pairs is not None:
+        chosen = matched_groups(groups.pos, est.pos, pairs)
+        for frames, end in ((sides.frames, ""), (core, "_core")):
+            parts.append(_matched_scores(groups, est, shared, chosen.keep(frames[chosen.frame]), frames, end))
+            parts.append(_group_hota(pairs.in_frames(frames), (n + m) * frames, end))
+    return parts
+
+
+def _matched_scores(
+    true: GroupRows, est: GroupRows, shared: SharedMembers, chosen: Pairs, frames: Bools, end: str
+) -> WeightedScores:
+    i, j, frame, (part, whole), scores = chosen.i, chosen.j, chosen.frame, CORRECT, FrameScores(len(frames))
+    distance = np.hypot(*(true.pos[i] - est.pos[j]).T)
+    scores.add_mean(f"group_MOTP{end}", frame, distance)
+    scores.add_mean(f"group_MSE{end}", frame, distance**2)
+    common = shared.of(i, j)
+    right = whole * common >= part * true.count[i]
+    pure = right & (whole * common >= part * est.count[j])
+    n, m = (scores.column(rows.frame, within=frames) for rows in (true.rows, est.rows))
+    hits, switches = scores.column(frame), scores.column(switch_frames(frame, true.rows.id[i], est.rows.id[j]))
+    false = m - hits
+    ratios = {
+        "1-FP": n - false, "1-FN": hits, "MOTA": hits - false - switches,
+        "GDSR": scores.column(frame[right]), "GDSR2": scores.column(frame[pure]),
+    }  # fmt: skip
+    for key, column in ratios.items():
+        scores.add_ratio(f"group_{key}{end}", column, n)
+    for key, column in {"TP": hits, "FP": false, "FN": n - hits, "IDSW": switches}.items():
+        scores.add(f"group_{key}{end}", column)
+    return scores
+
+
+def _group_hota(pairs: Pairs, rows: Array, end: str) -> WeightedScores:
+    hota = weighted_hota(pairs, len(rows))
+
+    def score(weights: Array) -> dict[str, Array]:
+        some = weights @ rows > 0
+        return {f"group_{key}{end}": np.where(some, values, np.nan) for key, values in hota(weights).items()}
+
+    return score

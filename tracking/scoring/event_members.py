@@ -1,4 +1,4 @@
-"""Converts events of the truth and of a tracker into `ComparableEvent`s, so that members on both sides are true people.
+"""Events of the truth and of a tracker with their members, parents and children as true people: `ComparableEvent`.
 
 `true_events` converts events of the truth, `tracked_events` those that a tracker reports with members,
 `events_of_hulls` events judged by who is inside the hulls of groups, for trackers that name no members. An event
@@ -9,16 +9,54 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from sim.types import Array, Bools, GroupEvent, Ints, Tracks
-from tracking.scoring.events import COUNTS_AS, HEADLINE, KINDS, ComparableEvent, EventMembers
-from tracking.scoring.people_and_groups import GroupRows, PersonRows
+from tracking.scoring.group_rows import GroupRows
+from tracking.scoring.people import PersonRows
 from tracking.scoring.rows import FrameRows, RowLookup
 
+KINDS = ("merge", "split", "cross", "queue", "enter", "leave")
+COUNTS_AS = {"form": "merge", "dissolve": "split"}
+HEADLINE = ("merge", "split")
 HULL_TIME = 2.0  # s before and after an event in which hulls decide who is in a group: the time of the merge rule
 CHANGES = frozenset(HEADLINE) | {kind for kind, counts_as in COUNTS_AS.items() if counts_as in HEADLINE}
+
+
+@dataclass(frozen=True, slots=True)
+class EventMembers:
+    """The members of an event, or of one group before or after it, as true people."""
+
+    people: frozenset[int]  # ids of true people
+    unmatched: int = 0  # number of further members that are mapped to no true person, or to one already in `people`
+
+    def jaccard(self, other: EventMembers) -> float:
+        """Returns the number of common people / the number of all members of both, 0 if both are empty. Each unmatched
+        member counts in the denominator only."""
+        common = len(self.people & other.people)
+        whole = len(self.people | other.people) + self.unmatched + other.unmatched
+        return common / whole if whole else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class ComparableEvent:
+    """An event whose members are true people, so that a true and a tracker's event can be compared."""
+
+    kind: str  # "merge", "split", "cross", "queue", "enter", "leave", "form" or "dissolve"
+    start: int  # frame number from 1 in which the event begins
+    emitted: int | None  # frame number of the `Tracks` that report it; None in the truth
+    members: EventMembers | None  # the people concerned; None if the tracker names no people
+    pos: tuple[float, float]  # x, y, in m on the ground or px in the image; nan unknown
+    # parents, children: one `EventMembers` per group (or single person) before and after the event; None if unknown
+    parents: tuple[EventMembers, ...] | None = None
+    children: tuple[EventMembers, ...] | None = None
+
+    @property
+    def has_lineage(self) -> bool:
+        """True if parents and children are known."""
+        return self.parents is not None and self.children is not None
 
 
 def true_events(

@@ -1,0 +1,121 @@
+"""Groups of beliefs: equal to a slow twin, whatever is missed or predicted."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from scenarios.loading.resolve import load
+from sim.sequence import simulate
+from tests import reference_belief as slow
+from tracking.grouping.belief import default_belief
+from tracking.grouping.belief_groups import belief_groups, groups_of_steps
+
+
+def tabled(found):
+    """The group of each step and person, (S, P), -1 alone."""
+    return found.of(*np.indices(found.shape))
+
+
+def parts(label):
+    """The groups of a step as sets of people; label (P,): the least person of each one's group, -1 alone."""
+    found = {frozenset(np.flatnonzero(label == g).tolist()) for g in set(label.tolist()) - {-1}}
+    assert all(label[min(part)] == min(part) for part in found)
+    return found
+
+
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize(("stay", "come"), [(0.0, 0.0), (2.5, 1.5)])
+def test_groups_of_steps_are_average_linkage_one_join_at_a_time(seed, stay, come):
+    """Of log-odds to which `stay` is added in groups of the step before, `come` taken elsewhere."""
+    r = np.random.default_rng(seed)
+    steps, people, unseen = 5, 9, -4.0
+    step, a, b = (x.ravel() for x in np.meshgrid(range(steps), range(people), range(people), indexing="ij"))
+    kept = (a < b) & (r.random(len(a)) < 0.7)
+    step, a, b = step[kept], a[kept], b[kept]
+    log_odds = r.normal(0.5, 3, len(a))
+    label = tabled(groups_of_steps((steps, people), step, a, b, log_odds, unseen, stay, come))
+    before, differ = set(), 0
+    for s in range(steps):
+        known = {(i, j): x for q, i, j, x in zip(step, a, b, log_odds, strict=True) if q == s}
+        table = {
+            (i, j): known.get((i, j), unseen) + (stay if any({i, j} <= g for g in before) else -come)
+            for i in range(people) for j in range(i + 1, people)
+        }  # fmt: skip
+        found = parts(label[s])
+        assert found == slow.groups(range(people), table, unseen)
+        differ += found != slow.groups(range(people), known, unseen)
+        before = found
+    assert bool(differ) == bool(stay)
+
+
+def test_a_chain_of_strangers_is_no_group_and_a_stretched_group_is_one():
+    pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)]
+    a, b = np.array(pairs).T
+    chain, stretched = np.array([1.0, -5, -6, 1, -5, 1]), np.array([4.0, 1, -1, 4, 1, 4])
+    for log_odds, size in ((chain, 2), (stretched, 4)):
+        label = tabled(groups_of_steps((1, 4), np.zeros(6, np.int64), a, b, log_odds, -4.0))
+        assert max(map(len, parts(label[0]))) == size
+
+
+def test_two_pairs_that_are_too_far_apart_for_evidence_are_two_groups():
+    step, a, b = [0] * 6 + [1, 1], [0, 0, 0, 1, 1, 2, 0, 2], [1, 2, 3, 2, 3, 3, 1, 3]
+    label = tabled(groups_of_steps((2, 4), *map(np.array, (step, a, b)), np.full(8, 5.0), -4.0, 7.0, 1.2))
+    assert label.tolist() == [[0, 0, 0, 0], [0, 0, 2, 2]]
+
+
+@pytest.fixture(scope="module")
+def scene():
+    truth = simulate(load("mixed"), 20000, streams=()).truth
+    r = np.random.default_rng(0)
+    return truth.replace(pos=truth.pos + r.normal(0, 0.02, truth.pos.shape), vel=None, box=None)
+
+
+def test_stay_and_come_decide_how_long_links_last(scene):
+    column = np.unique(scene.id, return_inverse=True)[1]
+    rows = (scene.frame - 1, column, scene.pos[:, :2], scene.length, scene.fps)
+
+    def changes(**changed):
+        return len(belief_groups(*rows, dataclasses.replace(default_belief(), **changed)).links.frame)
+
+    forgetful, default, late = changes(stay=0.0, come=0.0), changes(), changes(stay=30.0, come=30.0)
+    assert forgetful > default > late
+
+
+def side_by_side(apart):
+    """Rows of two people who walk at 1 m/s, their distances apart (T,), m, at 2.5 frames per s."""
+    length = len(apart)
+    x = np.arange(length) / 2.5
+    pos = np.stack([np.column_stack([x, 0 * x]), np.column_stack([x, np.asarray(apart, float)])], axis=1)
+    return np.repeat(np.arange(length), 2), np.tile([0, 1], length), pos.reshape(-1, 2), length, 2.5
+
+
+@pytest.mark.parametrize("together", [True, False])
+def test_predictions_neither_link_nor_part(together):
+    drift = 1 + np.clip((np.arange(60) - 30) / 3, 0, 8)  # the second person is predicted away, or near
+    rows = side_by_side(drift if together else 10 - drift)
+    seen = (rows[1] == 0) | (rows[0] < 30)
+    held, free = (belief_groups(*rows, default_belief(), some) for some in (seen, None))
+    assert held.links.on.tolist() == [True] * together
+    assert free.links.on.tolist() == [True] + [False] * together
+    assert ((tabled(held.now)[30:] >= 0) == together).all()
+    assert ((tabled(free.now)[-1] >= 0) != together).all()
+
+
+def test_people_who_are_not_measured_in_one_step_form_no_group():
+    # a new track of a person whose old track is still predicted, at 10 frames per s: at 1 m/s, 0.3 m apart
+    frame, column, pos, length, _ = side_by_side([1.2] * 40)
+    reported = (column == 0) | (frame > 20)
+    frame, column, pos = frame[reported], column[reported], pos[reported] / 4
+    seen = (frame > 20) == (column == 1)
+    held, free = (belief_groups(frame, column, pos, length, 10.0, default_belief(), some) for some in (seen, None))
+    assert not len(held.now.step)
+    assert (tabled(free.now)[-1] == 0).all()
+
+
+def test_a_missed_pair_that_was_seen_apart_is_not_together():
+    rows = side_by_side([*[1.0] * 30, *[20.0] * 3, *[20.0] * 10])
+    seen = (rows[1] == 0) | (rows[0] < 33)
+    assert (tabled(belief_groups(*rows, default_belief(), seen).now)[30:] < 0).all()
