@@ -5,9 +5,9 @@
 The commit, by default that of `beside.toml`, is checked out in a temporary worktree. One process for each tree makes
 the same inputs, runs every path once to compile its kernels, then runs the paths in turn with the other process. Only
 CPU time of the path counts. The ratio of a round is this tree's time over the commit's; shown are the median and its
-interval of about 99 % (order statistics). A path is slower if the median is above SLOWER and the interval is above
-SURELY; it is then measured a second time, and only if it is slower again the exit code is 1. A path that the commit
-cannot run is left out.
+interval of 99 % (order statistics; with fewer rounds all ratios). A path is slower if the median is above SLOWER and
+the interval is above SURELY; it is then measured a second time, and only if it is slower again the exit code is 1. A
+path that the commit cannot run is left out.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent
 SLOWER, SURELY = 1.10, 1.05
-OUTER = 1  # ratios on each side that the interval of the median leaves out: of 11, 1.2 % lie beyond
+ROUNDS = 11  # The median lies outside the second to the tenth of 11 ratios by a chance of 1.2 %.
 
 Work = Callable[[], object]
 
@@ -186,7 +186,7 @@ def is_slower(ratios: list[float]) -> bool:
 def ends(ratios: list[float]) -> tuple[float, float, float]:
     """Returns the lower end of the interval of the median, the median, and the upper end."""
     rows = sorted(ratios)
-    outer = min(OUTER, (len(rows) - 1) // 2)
+    outer = int(len(rows) >= ROUNDS)
     return rows[outer], float(np.median(rows)), rows[-1 - outer]
 
 
@@ -230,7 +230,7 @@ def main() -> int:
 
     parser = new_parser(__doc__)
     parser.add_argument("--commit", default=base())
-    parser.add_argument("--rounds", type=int, default=11)
+    parser.add_argument("--rounds", type=int, default=ROUNDS)
     parser.add_argument("--paths", nargs="+", default=[*PATHS], choices=[*PATHS], metavar="PATH")
     args = parser.parse_args()
     slower = slower_paths(args.commit, args.rounds, args.paths)
