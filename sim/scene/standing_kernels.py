@@ -82,6 +82,11 @@ def _solve(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _sum_of_squares(a):  # type: ignore[no-untyped-def]
+    return a[0] * a[0] + a[1] * a[1] + a[2] * a[2] + a[3] * a[3]
+
+
+@njit(cache=True)
 def bodies(low, size, z, lens, eye, turn, parts):  # type: ignore[no-untyped-def]
     """Returns the two bodies with each of the boxes, (2, R, 3): where they stand in the box, as shares of its width and
     height from the left upper corner, and their height, m. z (R,): height of the ground, m."""
@@ -93,9 +98,9 @@ def bodies(low, size, z, lens, eye, turn, parts):  # type: ignore[no-untyped-def
         for side in range(2):
             q[TURN] = -q[TURN]  # the second search begins at the mirror image of the first body
             _error(q, low[r], size[r], z[r], lens, eye, turn, parts, error)
-            damping = 1e-3
+            damping, moved = 1e-3, np.inf
             for _ in range(STEPS):
-                for k in range(4):
+                for k in range(4 if moved > 0.0 else 0):  # after a step that was refused the slopes are the same
                     new[:] = q
                     new[k] += NUDGE
                     _error(new, low[r], size[r], z[r], lens, eye, turn, parts, tried)
@@ -112,13 +117,13 @@ def bodies(low, size, z, lens, eye, turn, parts):  # type: ignore[no-untyped-def
                     new[k] = q[k] + min(max(g[k], -LARGEST), LARGEST)
                 new[TALL] = min(max(new[TALL], LOWEST), TALLEST)
                 _error(new, low[r], size[r], z[r], lens, eye, turn, parts, tried)
-                if (tried * tried).sum() <= (error * error).sum():
+                if _sum_of_squares(tried) <= _sum_of_squares(error):
                     moved = max(abs(new[SHARE_X] - q[SHARE_X]), abs(new[SHARE_Y] - q[SHARE_Y]))
                     q[:], error[:] = new, tried
                     damping *= 0.1
                     if moved < CLOSE:
                         break
                 else:
-                    damping *= 10.0
+                    damping, moved = 10.0 * damping, 0.0
             found[side, r] = q[:TURN]
     return found

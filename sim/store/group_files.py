@@ -141,10 +141,11 @@ def read_groups(table: StoredTable) -> list[Groups | None]:
     members, flat = table.lists("members", np.int64), table.lists("hull", np.float64)
     table.reject(any(len(h) % 2 for h in flat), "hull", "half a vertex", "x and y of each vertex")
     hulls = [h.reshape(-1, 2) for h in flat]
+    none = Groups(id[:0], (), pos[:0], vel[:0], extent[:0], size[:0], ())  # of most frames of some long recordings
     found: list[Groups | None] = []
     for k, r in enumerate(table.cuts(first, count), first):
         who = () if k in facts.memberless else tuple(members[r])
-        some = Groups(id[r], who, pos[r], vel[r], extent[r], size[r], tuple(hulls[r]))
+        some = Groups(id[r], who, pos[r], vel[r], extent[r], size[r], tuple(hulls[r])) if len(id[r]) else none
         found.append(None if k in facts.missing else some)
     return found
 

@@ -92,14 +92,13 @@ def test_a_box_whose_foot_shows_no_ground_is_left_out_and_its_owner_with_it() ->
     camera = sequence.camera
     assert camera is not None
     given = given_detections("file", sequence, {}, 0, owned=True)
-    first = given.detections[0]
+    first, *changed = given.detections
     assert first is not None
     assert first.box is not None
     box = first.box.copy()
     box[1, 1] = -1e5  # above the horizon
-    changed = given.detections[1:]
     kept = as_needed(type(given)([first.replace(box=box), *changed], given.owners), ("boxes",), "file", sequence)
-    found = kept.detections[0]
+    found = next(iter(kept.detections))
     assert found is not None
     assert kept.owners is not None
     assert given.owners is not None
