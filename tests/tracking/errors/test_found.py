@@ -178,10 +178,13 @@ def test_merges_and_splits(start: int, end: int, groups, kinds: list[str], unit:
     assert found.left["group_F1"] == pytest.approx(0, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("cause", "changes"),
-    [("hidden", {"visibility": 0.1}), ("edge", {"truncation": 0.6}), ("tracker", {}), ("undetected", {})],
-)
+CAUSES = [
+    ("hidden", {"visibility": 0.3}), ("tracker", {"visibility": 0.4}), ("edge", {"truncation": 0.25}),
+    ("tracker", {"truncation": 0.15}), ("tracker", {}), ("undetected", {}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("cause", "changes"), CAUSES)
 def test_causes_of_a_gap(cause: str, changes: dict[str, float]) -> None:
     made = truth(SCENES)
     gap = (made.id == 5) & (made.frame >= 20) & (made.frame <= 30)
