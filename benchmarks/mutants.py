@@ -178,8 +178,9 @@ class Player:
     def __init__(self, folder: Path, seconds: float) -> None:
         self.tree, self.seconds = folder / "tree", seconds
         self.good, self.bad = set[str](), set[str]()  # tests that pass and fail without a mutant
-        names = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-        paths = [ROOT / name for name in filter(None, names.split("\0"))]
+        line = ["git", "ls-files", "-zco", "--exclude-standard"]
+        names = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\0")
+        paths = [ROOT / name for name in filter(None, names)]
         for folder in {path.parent for path in paths}:
             paths += (folder / "__pycache__").glob("*")
         for path in filter(Path.is_file, paths):

@@ -67,10 +67,13 @@ def first_failure(
 
     tree: the folder whose tests and modules are loaded. tests: files or tests in it; left_out: not these.
     """
+    tests = [test for test in tests if test not in left_out]
+    if not tests:
+        return "", "", 0.0
     context = get_context("forkserver")
     context.set_forkserver_preload(list(LIBRARIES))
     with tempfile.NamedTemporaryFile("r+") as result:
-        words = [*(f"--deselect={test}" for test in left_out), *(test for test in tests if test not in left_out)]
+        words = [*(f"--deselect={test}" for test in left_out), *tests]
         process = context.Process(target=_run, args=(tree, words, seconds, result.name))
         process.start()
         process.join(WALL)
@@ -105,5 +108,5 @@ def _run(tree: Path, words: list[str], seconds: float, result: str) -> None:
     )
     if code not in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
         watch.failed = watch.failed or f"exit code {int(code)}"
-    Path(result).write_text(json.dumps([watch.failed, watch.why[-300:], spent()]), encoding="utf-8")
+    Path(result).write_text(json.dumps([watch.failed, watch.why[-2000:], spent()]), encoding="utf-8")
     os._exit(0)
