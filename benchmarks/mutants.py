@@ -1,14 +1,21 @@
 """Mutants: small changes of the mathematics and the decisions, one at a time, which the fast tests must see.
 
-    python -m benchmarks mutants [--count 300] [--seed 1] [--only tracking.filters …] [--jobs 2] [--seconds 90]
+    python -m benchmarks mutants [--count 300] [--seed 1] [--only tracking.filters …] [--jobs 2] [--seconds 45]
 
 Draws --count mutants of all that the operators of cosmic-ray make of the modules in ROOMS: comparisons, arithmetic,
-numbers, `and` and `or`, `not`, loops that end at once. Each is written into a copy of the tree, where the fast tests
-run that import its module, those of the module's own name first, until one fails or --seconds of CPU time have passed
-for the tests. A mutant that no test sees survives. SURVIVORS names the known ones with the reason why none has to.
-Kernels are compiled again for a mutant of a kernel. Needs the extra `mutants`.
+numbers, `and` and `or`, `not`, loops that end at once. Changes that cannot change a result are not drawn: annotations,
+blocks of TYPE_CHECKING, and OPTIONS as `cache=True` and `strict=True`.
 
-Prints a table of rooms (drawn, killed) and one of the survivors that are not named; exit code 1 below a share of MUST.
+Each mutant is written into a copy of the tree. There the fast tests run whose file imports the module directly, or
+through one or two other modules; the nearest files first, those of the module's own name before all. They run until one
+fails or --seconds of CPU time have passed. A mutant that no test sees survives. A test that fails without the mutant,
+too, does not count. The copy has the compiled kernels of the tree (`make test` compiles them); kernels that a mutant
+changes are compiled again.
+
+Verdicts are added to --out as they come: a run that was stopped goes on where it was, and --again plays the survivors
+again. SURVIVORS names those that no test has to see, with the reason. Needs the extra `mutants`.
+
+Prints a table of rooms (drawn, killed) and one of the survivors; exit code 1 below a share of MUST.
 """
 
 from __future__ import annotations
@@ -16,24 +23,25 @@ from __future__ import annotations
 import argparse
 import ast
 import difflib
+import json
 import os
-import re
-import resource
 import shutil
 import subprocess
 import sys
 import tempfile
+import threading
 import tomllib
 from collections import Counter
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, fields
 from functools import cache
+from itertools import islice
 from pathlib import Path
-from queue import Queue
 
 import numpy as np
 
+from benchmarks.support.forked_tests import first_failure
 from benchmarks.support.options import new_parser
 from benchmarks.support.tables import head, row
 
@@ -53,29 +61,26 @@ KINDS = (
     "ZeroIterationForLoop",
 )  # fmt: skip
 LEFT_OUT = ("BitOr", "BitAnd", "BitXor", "Shift", "Pow", "Invert")
-MEMORY = 6 * 2**30  # bytes of a process of tests
-PYTEST = ("-q", "-x", "-m", "not slow", "-p", "no:randomly", "--no-header", "-n", "0", "--disable-warnings")
+OPTIONS = ("cache", "frozen", "slots", "eq", "strict", "nogil", "kw_only", "deepcopy", "daemon")  # no result changes
+FARTHEST = 3  # imports from a test to the module
+BATCHES = (4, 12, 36)  # files of tests that one process collects, then the next one; then all others
 
 
 @dataclass(frozen=True)
 class Mutant:
-    """One change of a module: where it is, and both versions of its line."""
+    """One change of a module."""
 
     module: str
-    before: str
-    after: str
-    text: str  # the whole module, changed
-
-    @property
-    def change(self) -> str:
-        """The change as it stands in a table and in SURVIVORS."""
-        return f"{self.before.strip()} → {self.after.strip()}"
+    change: str  # "line → changed line", as in tables and in SURVIVORS
+    operator: str  # of cosmic-ray
+    occurrence: int  # of what the operator changes in the module, from 0
 
 
 def files() -> dict[str, Path]:
     """Returns the paths, relative to the root, of all modules and tests by dotted name."""
     found = [p for package in ("scenarios", "sim", "tracking", "tests") for p in sorted((ROOT / package).rglob("*.py"))]
-    return {".".join(p.relative_to(ROOT).with_suffix("").parts): p.relative_to(ROOT) for p in found}
+    parts = {p: p.relative_to(ROOT).with_suffix("").parts for p in found}
+    return {".".join(parts[p]).removesuffix(".__init__"): p.relative_to(ROOT) for p in found}
 
 
 @cache
@@ -90,120 +95,127 @@ def imported(path: Path) -> frozenset[str]:
     return frozenset(names)
 
 
-def tests_of(module: str, every: dict[str, Path]) -> list[Path]:
-    """Returns the test files that import a module, or a module that imports it: its mirror first, the nearest next."""
-    tests = {name: path for name, path in every.items() if path.parts[0] == "tests" and path.name.startswith("test_")}
-    users = {name for name, path in every.items() if path.parts[0] != "tests" and module in imported(path)}
-    stem = module.rpartition(".")[2].removesuffix("_kernels")
+@cache
+def tests_of(module: str) -> tuple[str, ...]:
+    """Returns the test files that import a module through at most FARTHEST imports: its mirror first, then by imports,
+    by common folders, and the smallest first."""
+    every = files()
+    distance, reached = {module: 0}, {module}
+    for step in range(1, FARTHEST + 1):
+        reached = {name for name, path in every.items() if name not in distance and imported(path) & reached}
+        distance |= dict.fromkeys(reached, step)
+    stem, own = module.rpartition(".")[2].removesuffix("_kernels"), module.split(".")[:-1]
 
-    def rank(path: Path) -> tuple[bool, bool, int, int]:
-        common = sum(a == b for a, b in zip(path.parts[1:-1], module.split(".")[:-1], strict=False))
-        return stem not in path.stem, module not in imported(path), -common, (ROOT / path).stat().st_size
+    def rank(name: str) -> tuple[bool, int, int, int]:
+        parts = every[name].parts
+        common = sum(a == b for a, b in zip(parts[1:-1], own, strict=False))
+        return (
+            not (common == len(own) and stem in parts[-1]),
+            distance[name],
+            -common,
+            (ROOT / every[name]).stat().st_size,
+        )
 
-    return sorted((p for p in tests.values() if imported(p) & {module, *users} or stem in p.stem), key=rank)
+    found = [name for name in distance if every[name].name.startswith("test_")]
+    return tuple(str(every[name]) for name in sorted(found, key=rank))
 
 
-def mutants_of(module: str, path: Path) -> Iterator[tuple[str, int]]:
-    """Yields operator and occurrence of each mutant of a module."""
+def mutants_of(module: str, path: Path) -> Iterator[tuple[str, str, int]]:
+    """Yields module, operator and occurrence of each mutant of a module."""
     from cosmic_ray.ast import ast_nodes, get_ast
     from cosmic_ray.plugins import get_operator, operator_names
 
-    tree = get_ast((ROOT / path).read_text(encoding="utf-8"))
+    nodes = list(ast_nodes(get_ast((ROOT / path).read_text(encoding="utf-8"))))
     for name in operator_names():
         kind = name.partition("/")[2]
         if kind.startswith(KINDS) and not any(word in kind for word in LEFT_OUT):
             operator = get_operator(name)()
-            count = sum(len(list(operator.mutation_positions(node))) for node in ast_nodes(tree))
-            yield from ((name, k) for k in range(count))
+            count = sum(len(list(operator.mutation_positions(node))) for node in nodes)
+            yield from ((module, name, k) for k in range(count))
 
 
-def made(module: str, path: Path, operator: str, occurrence: int) -> Mutant | None:
-    """Returns a mutant; None if it is the same program, as where only an annotation has changed."""
+def changed(module: str, path: Path, operator: str, occurrence: int) -> tuple[Mutant, str] | None:
+    """Returns a mutant and the text of its module; None if it is the same program, as with another annotation."""
     from cosmic_ray.mutating import mutate_code
     from cosmic_ray.plugins import get_operator
 
     text = (ROOT / path).read_text(encoding="utf-8")
-    changed = mutate_code(text, get_operator(operator)(), occurrence)
-    if changed is None or bare(changed) == bare(text):
+    other = mutate_code(text, get_operator(operator)(), occurrence)
+    if other is None or bare(other) == bare(text):
         return None
-    lines = [line for line in difflib.ndiff(text.splitlines(), changed.splitlines()) if line[0] in "-+"]
-    return Mutant(module, lines[0][2:], lines[-1][2:], changed)
+    lines = [line[2:].strip() for line in difflib.ndiff(text.splitlines(), other.splitlines()) if line[0] in "-+"]
+    return Mutant(module, f"{lines[0]} → {lines[-1]}", operator, occurrence), other
 
 
 def bare(text: str) -> str:
-    """Returns the tree of a program without annotations, as text."""
+    """Returns the tree of a program as text, without what cannot change a result."""
     tree = ast.parse(text)
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef):
             node.returns = None
         elif isinstance(node, ast.arg | ast.AnnAssign):
             node.annotation = ast.Constant(None)
+        elif isinstance(node, ast.Call):
+            node.keywords = [k for k in node.keywords if k.arg not in OPTIONS]
+        elif isinstance(node, ast.If) and ast.unparse(node.test) in ("TYPE_CHECKING", "not TYPE_CHECKING"):
+            node.test = node.body = node.orelse = []
     return ast.dump(tree)
 
 
-def drawn(count: int, seed: int, only: tuple[str, ...]) -> list[Mutant]:
-    """Returns `count` mutants, drawn without replacement from all mutants of the rooms."""
+def drawn(count: int, seed: int, only: tuple[str, ...]) -> dict[Mutant, str]:
+    """Returns `count` mutants and the texts of their modules, drawn without replacement from all of the rooms."""
     every = files()
     modules = [name for name in every if f"{name}.".startswith(tuple(f"{room}." for room in only))]
-    whole = [(name, *mutant) for name in modules for mutant in mutants_of(name, every[name])]
-    found = list[Mutant]()
-    for k in np.random.default_rng(seed).permutation(len(whole)):
-        name, operator, occurrence = whole[k]
-        mutant = made(name, every[name], operator, occurrence)
-        found += [] if mutant is None else [mutant]
-        if len(found) == count:
-            break
-    return found
+    whole = [mutant for name in modules for mutant in mutants_of(name, every[name])]
+    order = (whole[k] for k in np.random.default_rng(seed).permutation(len(whole)))
+    found = (changed(name, every[name], *which) for name, *which in order)
+    return dict(islice(filter(None, found), count))
 
 
-def killed(mutant: Mutant, tree: Path, seconds: float) -> bool:
-    """Returns True if a test fails in a copy of the tree that has the mutant, and passes in one that has not."""
-    every = files()
-    path = tree / every[mutant.module]
-    kept = path.read_text(encoding="utf-8")
-    environment = {**os.environ, "PYTHONPATH": str(tree), "PYTHONDONTWRITEBYTECODE": "1"}
-    if mutant.module.endswith("_kernels"):  # callers have compiled it into their own code
-        environment["NUMBA_CACHE_DIR"] = str(tree / ".kernels-of-mutant")
+class Player:
+    """Plays mutants in copies of the tree; state: the unchanged copy, and what is known of the tests there."""
 
-    def limits() -> None:
-        resource.setrlimit(resource.RLIMIT_CPU, (int(seconds), int(seconds) + 5))
-        resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    def __init__(self, folder: Path, seconds: float) -> None:
+        self.tree, self.seconds = folder / "tree", seconds
+        self.good, self.bad = set[str](), set[str]()  # tests that pass and fail without a mutant
+        line = ["git", "ls-files", "-zco", "--exclude-standard"]
+        names = subprocess.run(line, cwd=ROOT, capture_output=True, text=True, check=True).stdout.split("\0")
+        paths = [ROOT / name for name in filter(None, names)]
+        for folder in {path.parent for path in paths}:
+            paths += (folder / "__pycache__").glob("*")
+        for path in filter(Path.is_file, paths):
+            copy = self.tree / path.relative_to(ROOT)
+            copy.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(path, copy)
 
-    def played(tests: list[str]) -> tuple[int, list[str]]:
-        line = [sys.executable, "-m", "pytest", *PYTEST, *tests]
-        run = subprocess.run(
-            line, cwd=tree, env=environment, capture_output=True, text=True, preexec_fn=limits, check=False
-        )
-        return run.returncode, re.findall(r"^(?:FAILED|ERROR) (\S+)", run.stdout, re.MULTILINE)
+    def seen_by(self, module: str, text: str) -> tuple[str, str]:
+        """Returns the test that fails with the changed text of a module and passes without, "" if there is none; and
+        why it fails."""
+        tests, path, left, end = tests_of(module), files()[module], self.seconds, 0
+        with tempfile.TemporaryDirectory(dir=self.tree.parent) as folder:
+            tree = Path(folder, "tree")
+            shutil.copytree(self.tree, tree, copy_function=os.link)
+            (tree / path).unlink()
+            (tree / path).write_text(text, encoding="utf-8")
+            for size in (*BATCHES, len(tests)):
+                batch, end = tests[end : end + size], end + size
+                if not batch or left <= 0:
+                    break
+                failed, why, spent = first_failure(tree, batch, self.bad, left)
+                while failed and not self.passes(failed):
+                    failed, why, spent = first_failure(tree, batch, self.bad, left)
+                if failed:
+                    return failed, why
+                left -= spent
+        return "", ""
 
-    tests = [str(p) for p in tests_of(mutant.module, every)]
-    try:
-        path.write_text(mutant.text, encoding="utf-8")
-        code, failed = played(tests)
-    finally:
-        path.write_text(kept, encoding="utf-8")
-    shutil.rmtree(tree / ".kernels-of-mutant", ignore_errors=True)
-    if code in (0, 5):  # all passed, no test
-        return False
-    # Ended by its limit of time: a loop without end, if the same tests end without the mutant.
-    without = played(failed or tests)[0]
-    if failed and without:
-        raise SystemExit(f"{failed[0]} fails without a mutant")
-    return without == 0
-
-
-def copied(folder: Path) -> Path:
-    """Returns the root of a copy of the tracked files."""
-    names = subprocess.run(["git", "ls-files", "-z"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    for name in filter(None, names.split("\0")):
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        shutil.copy2(ROOT / name, folder / name)
-    return folder
-
-
-def known() -> dict[str, dict[str, str]]:
-    """Returns the reasons of SURVIVORS: by module, then by change."""
-    return tomllib.loads(SURVIVORS.read_text(encoding="utf-8")) if SURVIVORS.is_file() else {}
+    def passes(self, test: str) -> bool:
+        """Returns True if a test passes without a mutant; it is left out from now on if it does not."""
+        if not test.startswith("tests") or test in self.good:  # a signal needs no second look
+            return True
+        fails = bool(first_failure(self.tree, [test], (), self.seconds)[0])
+        (self.bad if fails else self.good).add(test)
+        return not fails
 
 
 def main() -> int:
@@ -212,43 +224,46 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="of the draw")
     parser.add_argument("--only", nargs="+", default=ROOMS, help="dotted names of rooms or modules")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
-    parser.add_argument("--seconds", type=float, default=90.0, help="CPU time of the tests of a mutant")
+    parser.add_argument("--seconds", type=float, default=45.0, help="CPU time of the tests of a mutant")
+    parser.add_argument("--out", type=Path, default=ROOT / "build" / "mutants.jsonl", help="file of the verdicts")
+    parser.add_argument("--again", action="store_true", help="plays the survivors in --out again")
     given: argparse.Namespace = parser.parse_args()
     mutants = drawn(given.count, given.seed, tuple(given.only))
+    given.out.parent.mkdir(parents=True, exist_ok=True)
+    lines = given.out.read_text(encoding="utf-8").splitlines() if given.out.is_file() else []
+    rows = [json.loads(line) for line in lines]
+    before = {Mutant(*(row[f.name] for f in fields(Mutant))): row["by"] for row in rows if row["by"] or not given.again}
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(given.jobs) as pool:
-        trees = Queue[Path]()
-        for k in range(given.jobs):
-            trees.put(copied(Path(folder, str(k))))
+        player, lock = Player(Path(folder), given.seconds), threading.Lock()
 
-        def play(mutant: Mutant) -> bool:
-            tree = trees.get()
-            try:
-                found = killed(mutant, tree, given.seconds)
-            finally:
-                trees.put(tree)
-            print(f"{'killed' if found else 'SURVIVED'}: {mutant.module}: {mutant.change}", file=sys.stderr, flush=True)
-            return found
+        def play(mutant: Mutant) -> str:
+            if mutant in before:
+                return before[mutant]
+            by, why = player.seen_by(mutant.module, mutants[mutant])
+            with lock, given.out.open("a", encoding="utf-8") as file:
+                file.write(json.dumps({**asdict(mutant), "by": by, "why": why}, ensure_ascii=False) + "\n")
+            print(f"{by or 'SURVIVED'}: {mutant.module}: {mutant.change}", file=sys.stderr, flush=True)
+            return by
 
-        verdicts = list(pool.map(play, mutants))
-    report(mutants, verdicts)
-    return int(sum(verdicts) < MUST * len(mutants))
+        verdicts = dict(zip(mutants, pool.map(play, mutants), strict=True))
+    report(verdicts)
+    return int(sum(map(bool, verdicts.values())) < MUST * len(verdicts))
 
 
-def report(mutants: list[Mutant], verdicts: list[bool]) -> None:
-    """Prints the tables."""
-    rooms = [".".join(m.module.split(".")[:2]) for m in mutants]
-    drawn_in, died = Counter(rooms), Counter(room for room, dead in zip(rooms, verdicts, strict=True) if dead)
+def report(verdicts: dict[Mutant, str]) -> None:
+    """Prints the tables. verdicts: of each mutant the test that saw it, "" if none did."""
+    of_room = {mutant: ".".join(mutant.module.split(".")[:2]) for mutant in verdicts}
+    found, died = Counter(of_room.values()), Counter(of_room[mutant] for mutant, by in verdicts.items() if by)
     head(["room", "drawn", "killed", "share"])
-    for room in sorted(drawn_in):
-        row([room, str(drawn_in[room]), str(died[room]), f"{died[room] / drawn_in[room]:.2f}"])
-    row(["all", str(len(mutants)), str(sum(verdicts)), f"{sum(verdicts) / max(len(mutants), 1):.2f}"])
-    reasons = known()
+    for room in sorted(found):
+        row([room, str(found[room]), str(died[room]), f"{died[room] / found[room]:.2f}"])
+    row(["all", str(len(verdicts)), str(died.total()), f"{died.total() / max(len(verdicts), 1):.2f}"])
+    reasons = tomllib.loads(SURVIVORS.read_text(encoding="utf-8"))
     print("\nSurvivors")
     head(["module", "change", "reason"])
-    for mutant, dead in zip(mutants, verdicts, strict=True):
-        if not dead:
-            reason = reasons.get(mutant.module, {}).get(mutant.change, "–")
-            row([mutant.module, f"`{mutant.change.replace('|', '¦')}`", reason])
+    for mutant in (mutant for mutant, by in verdicts.items() if not by):
+        reason = reasons.get(mutant.module, {}).get(mutant.change, "–")
+        row([mutant.module, f"`{mutant.change.replace('|', '¦')}`", reason])
 
 
 if __name__ == "__main__":

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
+from scipy.stats import norm, t
 
 from scenarios.schema.sensor import BoxNoise, Memory
-from sim.detector.box_noise import box_errors, perturb_boxes
+from sim.detector.box_noise import box_errors, heavy_tailed, perturb_boxes
 from sim.detector.draws import correlated_normals
 from sim.scene.camera import foot_points, project
 from tests.reference_sense import above, pinhole
@@ -22,6 +23,15 @@ def test_errors_have_the_means_and_sds_asked_for_and_grow_with_occlusion(visible
     e = box_errors(perturb_boxes(box, np.full(len(box), visible), NOISE, n), box)
     assert e.mean(axis=0) == pytest.approx([0.02, -0.03, 0.01, 0.2], abs=0.003 * factor)
     assert e.std(axis=0) == pytest.approx(factor * np.array([0.05, 0.04, 0.06, 0.1]), rel=0.03)
+
+
+@pytest.mark.parametrize("kurtosis", [0.5, 3.0, 30.0])
+def test_heavy_tails_are_those_of_students_t(kurtosis: float) -> None:
+    n, freedom = np.linspace(-5.0, 5.0, 301), 4 + 6 / kurtosis
+    expected = t.isf(norm.sf(np.abs(n)), freedom) * np.sign(n) * np.sqrt((freedom - 2) / freedom)
+    assert heavy_tailed(n, kurtosis) == pytest.approx(expected, rel=1e-3)
+    assert np.isfinite(heavy_tailed(np.array([-40.0, 8.3, 40.0]), kurtosis)).all()
+    assert heavy_tailed(n, 0.0) is n
 
 
 def test_small_boxes_are_off_by_the_floor() -> None:

@@ -131,3 +131,15 @@ def test_the_kernel_equals_its_twin():
         np.testing.assert_allclose(colour, twin[0], rtol=1e-4, err_msg=str(k))
         assert np.array_equal(sightings, twin[1])
     assert sightings.max() > background_kernels.MEMORY
+
+
+@pytest.mark.parametrize(("fps", "looks"), [(0.5, 3), (1.0, 3), (2.0, 3), (4.0, 5)])
+def test_looks_before_something_is_a_ghost(fps, looks):
+    """A second and a look, but no fewer than three looks, however slow the camera."""
+    ground, region = np.full((3, 40, 40), 90, np.float32), np.zeros((40, 40), bool)
+    region[10:30, 15:25] = True
+    model = np.where(region, 160, ground).astype(np.float32)
+    watched, image = ghosts.Ghosts((40, 40), np.ones(3), fps), np.moveaxis(ground, 0, -1).astype(np.uint8)
+    found = [watched.find(image, np.ones(3, np.float32), region, model, 20.0, 50.0) for _ in range(looks)]
+    assert [one is not None for one in found] == [False] * (looks - 1) + [True]
+    assert found[-1][region].all()

@@ -178,10 +178,13 @@ def test_merges_and_splits(start: int, end: int, groups, kinds: list[str], unit:
     assert found.left["group_F1"] == pytest.approx(0, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("cause", "changes"),
-    [("hidden", {"visibility": 0.1}), ("edge", {"truncation": 0.6}), ("tracker", {}), ("undetected", {})],
-)
+CAUSES = [
+    ("hidden", {"visibility": 0.3}), ("tracker", {"visibility": 0.4}), ("edge", {"truncation": 0.25}),
+    ("tracker", {"truncation": 0.15}), ("tracker", {}), ("undetected", {}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("cause", "changes"), CAUSES)
 def test_causes_of_a_gap(cause: str, changes: dict[str, float]) -> None:
     made = truth(SCENES)
     gap = (made.id == 5) & (made.frame >= 20) & (made.frame <= 30)
@@ -279,6 +282,16 @@ def test_nothing_is_left_of_a_group_with_people_who_are_found_elsewhere() -> Non
     found = find_errors(sequence_of(scenes), run)
     assert [one.error.kind for one in found.errors] == ["strangers joined"]
     assert found.left["group_F1"] == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize(("start", "kind"), [(20, "late group"), (45, "missed group")])
+def test_a_group_is_late_only_at_its_beginning(start: int, kind: str) -> None:
+    """It is there from frame 20 on, and missed for 5 frames."""
+    people = {1: (0.0, 0.0), 2: (0.0, 0.9)}
+    scenes = [Scene(people, {1: ([1, 2], None)} if n >= 20 else {}) for n in range(1, FRAMES + 1)]
+    run = [regrouped(t, [1, 2], -1, start, start + 4) for t in tracks(scenes)]
+    (one,) = find_errors(sequence_of(scenes), run).errors
+    assert (one.error.kind, one.error.start, one.error.end) == (kind, start, start + 4)
 
 
 @pytest.mark.parametrize(("end", "kind"), [(49, "late split"), (60, "missed split")])

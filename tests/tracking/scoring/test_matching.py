@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.optimize import linear_sum_assignment
 
 from tests.matrix_pairs import matrix_pairs
-from tracking.scoring.matching import mapped_people, match, match_as_table
+from tracking.scoring.matching import mapped_people, match, match_as_table, solve_rest
 from tracking.scoring.rows import FrameRows
 from tracking.scoring.similarity import Pairs, point_pairs
 
@@ -101,3 +101,10 @@ def test_ties_among_few_pairs_are_broken_as_in_the_whole_table() -> None:
         if table[a, b] > 0
     ]
     assert list(zip(pairs.i[chosen].tolist(), pairs.j[chosen].tolist(), strict=True)) == expected
+
+
+@pytest.mark.parametrize(("more", "only"), [(1e-12, False), (0.0, False), (1e-7, True)])
+def test_a_matching_is_the_only_best_one_if_it_is_better_by_more_than_rounding(more: float, only: bool) -> None:
+    i, j = np.array([0, 0, 1, 1]), np.array([0, 1, 0, 1])
+    found = solve_rest(i, j, np.array([0.5 + more, 0.7, 0.4, 0.6]))
+    assert (found is not None and found.tolist() == [True, False, False, True]) == only

@@ -82,6 +82,16 @@ def test_columns_and_scales(columns, scale):
     assert (f"--box-scale {SCALES[scale]}" in text) == (scale != (1.0, 1.0))
 
 
+@pytest.mark.parametrize(("share", "named"), [(0.2, False), (0.4, True)])
+def test_a_reading_is_named_only_if_it_matches_many_more_boxes(share, named):
+    rows = walk()
+    away = (np.random.default_rng(3).random((len(rows), 1)) > share) * (3000, 3000, 3000, 3000)
+    found = corners(rows[:, 2:]) + away
+    text = likely_misreading(truth_of(rows), tracks_of(rows[:, 0], rows[:, 1], found), size=SIZE)
+    assert text
+    assert ("read as x1,y1,x2,y2" in text) == named
+
+
 def test_shares_of_the_picture():
     rows = walk()
     found = seen(rows)

@@ -274,6 +274,7 @@ def test_a_score_counts_only_where_the_oracle_has_it(tmp_path: Path, groups: boo
     outcome = play_episode(setup.run, (), failure, load(str(tmp_path / "scene.toml")), 4)
     assert outcome.problem is None
     assert failure.holds(outcome) == groups
+    assert "HOTA" in outcome.scores
 
 
 @pytest.mark.parametrize("seconds", [2, 3])

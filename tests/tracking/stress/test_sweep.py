@@ -218,6 +218,23 @@ def test_values_are_placed_where_the_curve_breaks(tmp_path: Path) -> None:
     assert made.played <= 400
 
 
+@pytest.mark.parametrize(
+    ("episodes", "stopped", "values"),
+    [(60, False, [1, 0.85, 0.7, 0.625, 0.60625, 0.5875, 0.55, 0.4]), (12, True, [1, 0.7, 0.625, 0.5875, 0.55, 0.4])],
+)
+def test_values_halve_the_distance_in_which_all_scenes_break(episodes, stopped, values, tmp_path: Path) -> None:
+    """All break at 0.62. The last distance is below 0.05 of the axis; or the budget has no episodes for a value more,
+    of two seeds."""
+    made = sweep(tmp_path, [], start=2, episodes=episodes, seeds=(0, 1))
+    made.run_scenes = lambda scenes: (
+        [Outcome({"HOTA": 0.3 + 0.7 * (t.source.entry.scenario.sensor.detect_prob > 0.62)}) for t in tasks]
+        for tasks in scenes
+    )
+    made.run()
+    assert [value for (value,) in made.values] == pytest.approx(values)
+    assert (made.seeds, made.stopped, made.played) == (2, stopped, 2 * len(values))
+
+
 def test_seeds_come_before_values_where_scenes_break_at_different_places(tmp_path: Path) -> None:
     made = sweep(tmp_path, [], start=4, episodes=40)
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -62,3 +64,11 @@ def test_without_camera_or_bodies_people_hide_nobody(camera, radius):
     hidden, cut = covered_by_people(people([0, 0], [0, 0.6]), camera, radius)
     assert not hidden.any()
     assert not cut.any()
+
+
+@pytest.mark.parametrize(("visible", "is_hidden"), [(0.16, 1.0), (0.24, 0.0)])
+def test_hidden_is_who_shows_less_than_a_fifth(visible, is_hidden):
+    """The camera is as high as heads are, so that the other one covers the whole height of a part of the width."""
+    at_heads = replace(CAMERA, position=np.array([0.0, -10.0, 1.7]))
+    hidden, _ = covered_by_people(people([0, 0], [2 * 0.25 * visible, 0.001]), at_heads, 0.25)
+    np.testing.assert_allclose(hidden, [0.0, is_hidden], atol=1e-12)

@@ -1,4 +1,4 @@
-"""Points from pairs of pictures: what the background model learns."""
+"""Points from pairs of pictures: what the background model learns, and from surfaces to the middle of people."""
 
 from __future__ import annotations
 
@@ -7,8 +7,9 @@ import pytest
 
 from sim.types import Context
 from tests.sim.scene.test_camera_stereo import rig
+from tracking.detect.features import SpacePoints
 from tracking.papers.stereo.config import StereoConfig
-from tracking.papers.stereo.picture_points import PicturePoints
+from tracking.papers.stereo.picture_points import PicturePoints, moved_away
 
 FPS = 10.0
 
@@ -30,3 +31,12 @@ def test_a_picture_that_stays_bright_becomes_background(monkeypatch: pytest.Monk
     for _ in range(80):
         assert not len(source.points(picture(180), picture(180)))
     assert source.foreground.segment(picture(180)).plausible
+
+
+def test_points_move_away_from_the_camera_along_the_ground() -> None:
+    camera = rig(40.0)
+    away = np.array([[3.0, 4.0, 0.5], [-6.0, 8.0, 1.0], [0.0, -2.0, 1.5]])
+    pos = away + np.append(camera.position[:2], 0.0)
+    zero, cov = np.zeros((3, 3)), np.zeros((3, 3, 3))
+    moved = moved_away(SpacePoints(np.arange(3), pos, cov, zero, cov), camera, 0.2).pos
+    np.testing.assert_allclose(moved - pos, [[0.12, 0.16, 0.0], [-0.12, 0.16, 0.0], [0.0, -0.2, 0.0]], atol=1e-12)
