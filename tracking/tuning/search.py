@@ -89,9 +89,8 @@ def _search(options: TuneOptions) -> TuningResult:
 
 
 def require_optuna(place: str) -> None:
-    """Raises InputError if Optuna or filelock is missing; place: what needs them."""
+    """Raises InputError if Optuna is missing; place: what needs them."""
     with extra_needed("tune", place):
-        import filelock  # noqa: F401
         import optuna  # noqa: F401
 
 
