@@ -3,8 +3,8 @@
     python -m benchmarks moving [--out docs/moving.webp]
 
 The scene is `benchmarks/moving.toml`. ByteTrack (roboflow `trackers`, its defaults) is installed in a folder of its
-own; its groups are derived from its tracks as for any tracker without groups. The picture rests where its dearest error
-of groups begins.
+own; its groups are derived from its tracks as for any tracker without groups. The picture begins and rests where its
+dearest error of groups begins.
 """
 
 from __future__ import annotations
@@ -92,7 +92,9 @@ def main() -> None:
     dearest = max((f for f in errors["ByteTrack"].errors if isinstance(f.error, GroupError)), key=lambda f: f.cost or 0)
     pictures = moving(sequence, layers, errors)
     times = [int(1000 * STEP / sequence.fps)] * len(pictures)
-    times[-(-(dearest.error.start - 1) // STEP)] = times[-1] = REST
+    first = -(-(dearest.error.start - 1) // STEP)
+    times[first] = times[-1] = REST
+    pictures, times = pictures[first:] + pictures[:first], times[first:] + times[:first]
     frames = [Pillow.fromarray(cv2.cvtColor(picture, cv2.COLOR_BGR2RGB)) for picture in pictures]
     frames[0].save(args.out, save_all=True, append_images=frames[1:], duration=times, loop=0, quality=50, method=6)
     print(f"{args.out}: {len(frames)} pictures, {args.out.stat().st_size / 1e6:.2f} MB")
