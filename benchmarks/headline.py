@@ -52,13 +52,14 @@ def peers() -> str:
         parts.append((ours, best, len({row["tracker"].removesuffix(", tuned") for row in others})))
     (ours, best, count), *real = parts
     listed = ", ".join(
-        f"{n} {number(a['HOTA'])} ({number(b['HOTA'])})" for n, (a, b, _) in zip(RECORDINGS.values(), real, strict=True)
+        f"{n} {number(a['HOTA'])} and {number(b['HOTA'])}"
+        for n, (a, b, _) in zip(RECORDINGS.values(), real, strict=True)
     )
     return (
         "- **People**: on 24 simulated scenes with occlusion, from the same boxes, `blob` reaches HOTA"
-        f" {number(ours['HOTA'])} and group F1 {number(ours['group_F1'])}; the best of {count} trackers of other"
-        f" libraries ({best['tracker']}) {number(best['HOTA'])} and {number(best['group_F1'])}. From the boxes of"
-        f" recordings, and in brackets the best other: {listed}"
+        f" {number(ours['HOTA'])}, the best of {count} trackers of other libraries ({best['tracker']})"
+        f" {number(best['HOTA'])}; group F1 (people in the right groups) {number(ours['group_F1'])} and"
+        f" {number(best['group_F1'])}. HOTA of both from boxes of recordings: {listed}"
         " ([table](docs/results/trackers.md#beside-other-trackers))."
     )
 
@@ -71,8 +72,8 @@ def groups() -> str:
         for name in ("seq_hotel", "zara01")
     )
     return (
-        f"- **Groups**: who walks together, from labelled positions: pairwise F1 {listed}; in brackets SPENCER's"
-        " relation ([table](docs/results/belonging.md))."
+        f"- **Groups**: who walks with whom, from people's positions, pairwise F1 on two recordings: {listed};"
+        " SPENCER is the other open tool ([table](docs/results/belonging.md))."
     )
 
 
@@ -97,9 +98,9 @@ def tuning() -> str:
     plain, blob = stored("tuning", "Follower")["rows"], stored("tuning", "Blob")["rows"]
     scenes, real = (" and ".join(signed(row[k]) for row in plain) for k in (2, 4))
     return (
-        f"What it earns: a plain tracker gains HOTA {scenes} on scenes like two recordings, and {real} on the"
+        f"What it earns: a nearest-neighbour tracker gains HOTA {scenes} on scenes like two recordings, and {real} on the"
         f" recordings themselves; `blob`, whose defaults are tuned, {' and '.join(signed(row[4]) for row in blob)}"
-        " there ([table](docs/results/trackers.md#does-tuning-on-simulated-scenes-help-on-recordings); a star: sure)."
+        " there ([table](docs/results/trackers.md#does-tuning-on-simulated-scenes-help-on-recordings); * the 95 % interval is without 0)."
     )
 
 
