@@ -68,12 +68,12 @@ def groups() -> str:
     """The belief of who belongs together beside SPENCER."""
     found = {row["recording"]: row for row in rows("belonging-recordings")}
     listed = " and ".join(
-        f"{number(found[name]['belief'])} on {name} ({number(found[name]['SPENCER'])})"
+        f"{number(found[name]['belief'])} on {name} (SPENCER: {number(found[name]['SPENCER'])})"
         for name in ("seq_hotel", "zara01")
     )
     return (
         f"- **Groups**: who walks with whom, from people's positions, pairwise F1 on two recordings: {listed};"
-        " SPENCER is the other open tool ([table](docs/results/belonging.md))."
+        " SPENCER is the other open tool for this ([table](docs/results/belonging.md))."
     )
 
 
@@ -98,9 +98,11 @@ def tuning() -> str:
     plain, blob = stored("tuning", "Follower")["rows"], stored("tuning", "Blob")["rows"]
     scenes, real = (" and ".join(signed(row[k]) for row in plain) for k in (2, 4))
     return (
-        f"What it earns: a nearest-neighbour tracker gains HOTA {scenes} on scenes like two recordings, and {real} on the"
-        f" recordings themselves; `blob`, whose defaults are tuned, {' and '.join(signed(row[4]) for row in blob)}"
-        " there ([table](docs/results/trackers.md#does-tuning-on-simulated-scenes-help-on-recordings); * the 95 % interval is without 0)."
+        f"What it earns: a nearest-neighbour tracker gains HOTA {scenes} on scenes like two recordings, and {real} on"
+        " the recordings themselves; `blob`, whose defaults are tuned,"
+        f" {' and '.join(signed(row[4]) for row in blob)} there"
+        " ([table](docs/results/trackers.md#does-tuning-on-simulated-scenes-help-on-recordings); a star: the 95 %"
+        " interval does not hold 0)."
     )
 
 

@@ -42,11 +42,11 @@ def words(found: FoundError) -> str:
 
 
 def panel(shape: tuple[int, ...], index: int, fps: float, errors: dict[str, RunErrors]) -> Image:
-    """Returns the picture of the words: scores of the whole run, and the dearest errors of the last second."""
+    """Returns the picture of the words: scores of the whole run, and the dearest errors of frame `index`."""
     picture, lines = np.full(shape, FLOOR, np.uint8), [f"frame {index}, {(index - 1) / fps:.1f} s"]
     for name, of in errors.items():
         scores = of.scores
-        now = [f for f in of.errors if f.error.start <= index <= f.error.end + fps and f.cost]
+        now = [f for f in of.errors if f.error.start <= index <= f.error.end and f.cost]
         count = sum(f.error.kind == "switch" for f in of.errors if f.error.start <= index)
         lines += [
             f"{name}: HOTA {scores['HOTA']:.2f}, group F1 {scores['group_F1']:.2f}, {count} identity switches so far"
