@@ -109,9 +109,8 @@ def associate(mean: Array, cov: Array, points: Array, noise: float, odds: Array)
     reach = np.sqrt(np.maximum(2 * log_odds - log_det, 0.0) * (S[:, 0, 0] + S[:, 1, 1])) * 1.001 + 1e-6
     order = np.argsort(points[:, 0])
     first, last = (np.searchsorted(points[order, 0], mean[:, 0] + side * reach) for side in (-1, 1))
-    count = last - first
-    rows = np.repeat(np.arange(len(mean)), count)
-    columns = order[np.arange(len(rows)) - np.repeat(np.cumsum(count) - last, count)]
+    rows = np.repeat(np.arange(len(mean)), last - first)
+    columns = order[np.arange(len(rows)) - np.repeat(np.cumsum(last - first) - last, last - first)]
     x, y = (points[columns] - mean[rows]).T
     xx, xy, yx, yy = np.linalg.inv(S).reshape(-1, 4)[rows].T
     d2 = x * xx * x + x * xy * y + y * yx * x + y * yy * y
