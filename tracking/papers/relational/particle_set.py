@@ -125,9 +125,9 @@ class ParticleSet:
             for values in (self.pos, self.vel, self.exist):
                 values[:, few] = values[chosen, few]
             # a relation is drawn with each person alone: particles of both are independent then
-            column = np.full(len(self.weights.T), -1)
-            column[few] = np.arange(len(few))
-            for own in column[self.pairs].T:  # the smaller person comes first
+            place = np.full(len(self.weights.T), -1)
+            place[few] = np.arange(len(few))
+            for own in place[self.pairs].T:  # the smaller person comes first
                 rows = np.flatnonzero(own >= 0)
                 self.related[rows] = np.take_along_axis(self.related[rows], chosen.T[own[rows]], axis=1)
         self.weights[:, few] = 1 / self.count
