@@ -82,11 +82,6 @@ def _solve(a, b):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _sum_of_squares(a):  # type: ignore[no-untyped-def]
-    return a[0] * a[0] + a[1] * a[1] + a[2] * a[2] + a[3] * a[3]
-
-
-@njit(cache=True)
 def bodies(low, size, z, lens, eye, turn, parts):  # type: ignore[no-untyped-def]
     """Returns the two bodies with each of the boxes, (2, R, 3): where they stand in the box, as shares of its width and
     height from the left upper corner, and their height, m. z (R,): height of the ground, m."""
@@ -117,7 +112,7 @@ def bodies(low, size, z, lens, eye, turn, parts):  # type: ignore[no-untyped-def
                     new[k] = q[k] + min(max(g[k], -LARGEST), LARGEST)
                 new[TALL] = min(max(new[TALL], LOWEST), TALLEST)
                 _error(new, low[r], size[r], z[r], lens, eye, turn, parts, tried)
-                if _sum_of_squares(tried) <= _sum_of_squares(error):
+                if (tried * tried).sum() <= (error * error).sum():
                     moved = max(abs(new[SHARE_X] - q[SHARE_X]), abs(new[SHARE_Y] - q[SHARE_Y]))
                     q[:], error[:] = new, tried
                     damping *= 0.1

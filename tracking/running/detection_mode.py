@@ -121,7 +121,6 @@ def as_needed(given: Given, needs: tuple[str, ...], mode: DetectionMode, sequenc
         pos = standing_points(box, camera, sequence.scene)
     there = np.isfinite(pos).all(axis=1) | ~np.isfinite(box).all(axis=1)  # check_detections names a box that is nan
     cuts = np.cumsum([0, *map(len, boxes)], dtype=int)
-    del boxes
 
     def found() -> Iterator[Detections | None]:
         for d, (a, b) in zip(given.detections, pairwise(cuts), strict=True):

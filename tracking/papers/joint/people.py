@@ -14,7 +14,7 @@ import numpy as np
 from sim.types import Array, Bools, Ints
 from tracking.detect.point_detections import PersonTable
 from tracking.filters import existence, kalman
-from tracking.filters.assignment import optimal
+from tracking.filters.assignment import one_to_one
 from tracking.filters.person_streams import birth_keys
 from tracking.papers.joint.config import BIRTH_DENSITY, CLUTTER_DENSITY, SPEED_PRIOR
 
@@ -104,9 +104,19 @@ def associate(mean: Array, cov: Array, points: Array, noise: float, odds: Array)
     (R,) of the points, 1/m^2. A pair is more probable than none, and the product of all is the largest. odds (K,): as
     `Candidates.odds`."""
     S = cov + noise**2 * np.eye(2)
-    x, y = (points[:, axis] - mean[:, axis, None] for axis in range(2))
-    xx, xy, yx, yy = np.linalg.inv(S).reshape(-1, 4, 1).swapaxes(0, 1)
+    log_det, log_odds = np.linalg.slogdet(2 * np.pi * S)[1], np.log(odds)
+    # Only points on a strip of the probable ones are looked at: of 2,000 people in a hall one in 40.
+    reach = np.sqrt(np.maximum(2 * log_odds - log_det, 0.0) * (S[:, 0, 0] + S[:, 1, 1])) * 1.001 + 1e-6
+    order = np.argsort(points[:, 0])
+    first, last = (np.searchsorted(points[order, 0], mean[:, 0] + side * reach) for side in (-1, 1))
+    rows = np.repeat(np.arange(len(mean)), last - first)
+    columns = order[np.arange(len(rows)) - np.repeat(np.cumsum(last - first) - last, last - first)]
+    x, y = (points[columns] - mean[rows]).T
+    xx, xy, yx, yy = np.linalg.inv(S).reshape(-1, 4)[rows].T
     d2 = x * xx * x + x * xy * y + y * yx * x + y * yy * y
-    log_density = -(d2 + np.linalg.slogdet(2 * np.pi * S)[1][:, None]) / 2
-    rows, columns = optimal(-log_density - np.log(odds)[:, None], 0.0)
-    return rows, columns, np.exp(log_density[rows, columns])
+    log_density = -(d2 + log_det[rows]) / 2
+    cost = -log_density - log_odds[rows]
+    kept = np.flatnonzero(cost < 0)
+    kept = kept[np.lexsort((columns[kept], rows[kept]))]
+    best = kept[one_to_one(rows[kept], columns[kept], cost[kept])]
+    return rows[best], columns[best], np.exp(log_density[best])

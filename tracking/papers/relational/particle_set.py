@@ -125,9 +125,11 @@ class ParticleSet:
             for values in (self.pos, self.vel, self.exist):
                 values[:, few] = values[chosen, few]
             # a relation is drawn with each person alone: particles of both are independent then
-            for person, own in zip(few.tolist(), chosen.T, strict=True):
-                rows = (self.pairs == person).any(axis=1)
-                self.related[rows] = self.related[rows][:, own]
+            place = np.full(len(self.weights.T), -1)
+            place[few] = np.arange(len(few))
+            for own in place[self.pairs].T:  # the smaller person comes first
+                rows = np.flatnonzero(own >= 0)
+                self.related[rows] = np.take_along_axis(self.related[rows], chosen.T[own[rows]], axis=1)
         self.weights[:, few] = 1 / self.count
         return few
 
