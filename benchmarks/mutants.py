@@ -7,7 +7,7 @@ numbers, `and` and `or`, `not`, loops that end at once. Changes that cannot chan
 blocks of TYPE_CHECKING, and OPTIONS as `cache=True` and `strict=True`.
 
 Each mutant is written into a copy of the tree. There the fast tests run whose file imports the module directly, or
-through one or two other modules; the nearest files first, those of the module's own name before all. They run until one
+through one or two other modules; those of the module's own name first, then those of its room. They run until one
 fails or --seconds of CPU time have passed. A mutant that no test sees survives. A test that fails without the mutant,
 too, does not count. The copy has the compiled kernels of the tree (`make test` compiles them); kernels that a mutant
 changes are compiled again.
@@ -97,8 +97,8 @@ def imported(path: Path) -> frozenset[str]:
 
 @cache
 def tests_of(module: str) -> tuple[str, ...]:
-    """Returns the test files that import a module through at most FARTHEST imports: its mirror first, then by imports,
-    by common folders, and the smallest first."""
+    """Returns the test files that import a module through at most FARTHEST imports: its mirror first, then those of
+    few imports and many common folders, of these the smallest."""
     every = files()
     distance, reached = {module: 0}, {module}
     for step in range(1, FARTHEST + 1):
@@ -106,15 +106,11 @@ def tests_of(module: str) -> tuple[str, ...]:
         distance |= dict.fromkeys(reached, step)
     stem, own = module.rpartition(".")[2].removesuffix("_kernels"), module.split(".")[:-1]
 
-    def rank(name: str) -> tuple[bool, int, int, int]:
+    def rank(name: str) -> tuple[bool, int, int]:
         parts = every[name].parts
         common = sum(a == b for a, b in zip(parts[1:-1], own, strict=False))
-        return (
-            not (common == len(own) and stem in parts[-1]),
-            distance[name],
-            -common,
-            (ROOT / every[name]).stat().st_size,
-        )
+        mirror = common == len(own) and stem in parts[-1]
+        return not mirror, distance[name] - common, (ROOT / every[name]).stat().st_size
 
     found = [name for name in distance if every[name].name.startswith("test_")]
     return tuple(str(every[name]) for name in sorted(found, key=rank))
@@ -213,7 +209,8 @@ class Player:
         """Returns True if a test passes without a mutant; it is left out from now on if it does not."""
         if not test.startswith("tests") or test in self.good:  # a signal needs no second look
             return True
-        fails = bool(first_failure(self.tree, [test], (), self.seconds)[0])
+        seconds = self.seconds if "::" in test else 0.0  # of a file that cannot be imported no test runs
+        fails = bool(first_failure(self.tree, [test], (), seconds)[0])
         (self.bad if fails else self.good).add(test)
         return not fails
 

@@ -4,7 +4,7 @@ import pytest
 from sim.scene.body import ellipsoids, person_boxes
 from sim.scene.camera import rays
 from sim.scene.visibility import BodyVisibility, measure_visibility
-from sim.scene.visibility_kernels import COLUMNS
+from sim.scene.visibility_kernels import COLUMNS, visible_span
 from sim.types import Array, Camera, Scene
 from tests import reference_render as slow
 from tests.reference_sense import pinhole
@@ -123,3 +123,18 @@ def test_order_of_rows_and_further_frames_change_nothing(seed: int) -> None:
     )
     assert both.visibility == pytest.approx(np.concatenate([one.visibility, one.visibility]))
     assert one.box == pytest.approx(person_boxes(pinhole(), pos3, heading, height))
+
+
+@pytest.mark.parametrize(
+    ("start", "low", "high", "expected"),
+    [
+        (10.0, 3, 6, (13.0, 4.0)),
+        (10.0, 1, 6, (10.0, 7.0)),  # the first of the silhouette's cells: to the edge of the box
+        (10.0, 3, 8, (13.0, 7.0)),  # the last one
+        (-5.0, 3, 8, (0.0, 5.0)),
+        (25.0, 1, 8, (25.0, 5.0)),
+    ],
+)
+def test_the_span_of_visible_cells_is_cut_by_the_image(start, low, high, expected) -> None:
+    """Ten cells of 1 px, of which the silhouette covers those from 1 to 8, in an image of 30 px."""
+    assert visible_span(start, 10.0, 10, low, high, 1, 8, 30.0) == pytest.approx(expected)

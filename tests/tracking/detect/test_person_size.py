@@ -61,6 +61,17 @@ def test_people_wider_or_narrower_than_the_typical_one_are_learned_with_a_camera
     assert size.at(foot)[:, 1] == pytest.approx(right, rel=0.1)
 
 
+@pytest.mark.parametrize(("seen", "learned"), [(0.75, 0.9), (0.94, 0.94), (1.06, 1.06), (1.3, 1.1)])
+def test_with_a_camera_a_tenth_of_the_height_is_learned(seen, learned):
+    r, camera_here = np.random.default_rng(0), camera(0.4)
+    size = PersonSize(Context(10.0, 60.0, camera=camera_here, image_size=camera_here.image))
+    foot = np.column_stack([r.uniform(60, 420, 60), r.uniform(200, 340, 60)])
+    h, w = (side.copy() for side in size.at(foot).T)
+    box = np.column_stack([foot[:, 0] - w / 2, foot[:, 1] - seen * h, w, seen * h])
+    size.learn(box, ellipses(box), np.ones(60, bool))
+    assert size.at(foot)[:, 0] == pytest.approx(learned * h, rel=0.03)
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_the_line_is_found_among_groups_and_pieces(seed):
     r = np.random.default_rng(seed)

@@ -8,6 +8,7 @@ import pytest
 from sim.geometry.polygons import footprint_hulls
 from tests.hand_made import Scene, event, tracks, truth
 from tracking.scoring import evaluate
+from tracking.scoring.people_and_groups import true_groups, true_people
 
 APART = {1: (0.5, 0.5), 2: (1.5, 0.5), 3: (3.2, 0.5), 4: (3.8, 0.5)}
 
@@ -143,3 +144,12 @@ def test_in_the_image_the_hulls_of_the_image_are_compared():
     assert found["group_F1"] == found["pairwise_F1"] == found["HOTA"] == near(1)
     shifted = [Scene(px, {1: ((1, 2), (60, 0, 140, 40))})]  # middles 60 px apart
     assert evaluate(true, tracks(shifted, plane="image"))["group_MOTP"] == near(60)
+
+
+def test_members_are_renumbered_and_unknown_ones_stay_unknown():
+    true = truth([Scene(APART, {1: ((1, 2), None), 2: ((3, 9), (0, 0, 2, 1))})])
+    people = true_people(true, np.ones(2, bool))
+    groups = true_groups(true, np.array([False, True]), people.rows, "ground")
+    assert groups.groups.member.tolist() == [0, 1, 2, -1]
+    kept = groups.in_frames(np.ones(2, bool), np.array([False, *[True] * (len(people.rows) - 1)]))
+    assert kept.groups.member.tolist()[1:] == [0, 1, -1]

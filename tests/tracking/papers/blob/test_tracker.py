@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -53,6 +55,12 @@ def crowd(seed, frames=60, people=8):
 @pytest.fixture(params=["rho", "existence"])
 def config(request):
     return BlobConfig(management=request.param)
+
+
+def test_without_an_image_size_the_view_is_what_boxes_have_covered(config):
+    tracker = Blob(config)
+    run([at((100, 200), (300, 260)), at((50, 400))], tracker=tracker, context=replace(CONTEXT, image_size=None))
+    assert tracker.people.view.tolist() == [[50, 200], [328, 468]]
 
 
 def test_one_person_is_one_track(config):

@@ -73,7 +73,9 @@ def test_a_person_is_resampled_alone_and_takes_the_own_relations():
     particles.weights[:, 0] = few / 40
     old = {tuple(x) for x in particles.pos[few, 0]}
     others = particles.pos[:, 1:].copy()
-    particles.resample(0.9, drawn(particles, np.random.default_rng(0)))
+    draws = drawn(particles, np.random.default_rng(0))
+    assert not len(particles.resample(0.09, draws)), "a tenth of the particles is effective"
+    assert particles.resample(0.9, draws).tolist() == [0]
     assert {tuple(x) for x in particles.pos[:, 0]} <= old
     assert np.array_equal(particles.pos[:, 1:], others)
     assert particles.pairs.tolist() == [[0, 1], [1, 2]]

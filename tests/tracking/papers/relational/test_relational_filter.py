@@ -417,3 +417,17 @@ def test_the_belief_tells_who_passes_from_who_walks_along():
         stays, comes = np.log(both) - np.log1p(-np.array(both))
         assert stays > 2
         assert (stays - comes > 2) == (evidence == "belief"), (evidence, stays, comes)
+
+
+@pytest.mark.parametrize("kind", [Particle, Relational])
+def test_in_the_image_the_answers_are_those_on_the_ground_in_px(kind):
+    walk = [[(1 + 0.1 * k, 2.0), (1 + 0.1 * k, 2.8), (9 - 0.1 * k, 5.0)] for k in range(20)]
+    ground, tracker = stepped(kind(), walk)[-1], kind()
+    tracker.reset(Context(10.0, 40.0), 0)
+    for k, points in enumerate(walk, 1):
+        found = detections(k, 40.0 * np.array(points))
+        image = tracker.step(Frame(k, (k - 1) / 10.0), dataclasses.replace(found, plane="image"))
+    assert len(image.id) == 3
+    np.testing.assert_allclose(image.pos, 40 * ground.pos)
+    np.testing.assert_allclose(image.vel, 40 * ground.vel)
+    np.testing.assert_allclose(image.cov, 1600 * ground.cov)
