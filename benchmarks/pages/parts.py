@@ -174,8 +174,8 @@ def parameters(name: str) -> str:
 
 
 def _shown(value: object) -> str:
-    """Returns a value of a parameter; of a vector a number for each line."""
-    return " ".join(map(str, value)) if isinstance(value, tuple) else str(value)
+    """Returns a value of a parameter; the numbers of a vector with commas."""
+    return ", ".join(map(str, value)) if isinstance(value, tuple) else str(value)
 
 
 def constants(name: str) -> str:
