@@ -5,7 +5,7 @@ from __future__ import annotations
 import ast
 import inspect
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from importlib import import_module
 from typing import Any
 
@@ -20,8 +20,12 @@ WORDS = {"Args": "Arguments", "Attributes": "Fields", "Raises": "Raises"}
 
 
 def section(name: str) -> str:
-    """Returns an entry for each public name of a section of the page."""
-    return "\n\n".join(_entry(path, _object(path)) for path in NAMES[name])
+    """Returns an entry for each public name of a section of the page; that of a second name leads to the first."""
+    first = {_object(path): path for path in reversed(PATHS)}
+    return "\n\n".join(
+        _entry(path, _object(path)) if first[_object(path)] == path
+        else f"### {path}\n\nThe same as {_linked(f'`{first[_object(path)]}`')}." for path in NAMES[name]
+    )  # fmt: skip
 
 
 def without_entry() -> list[str]:
@@ -39,7 +43,11 @@ def _entry(path: str, thing: Any) -> str:
     if not inspect.isclass(thing):
         return f"### {path}\n\n{_code(_signature(thing))}\n\n{_docstring(thing)}"
     methods = [] if path in WITHOUT_METHODS else [_method(thing.__name__, *found) for found in _methods(thing)]
-    return "\n\n".join([f"### {path}", _code(_head(thing)), _docstring(thing), *methods])
+    return "\n\n".join([f"### {path}", _code(_head(thing)), _docstring(thing, _fields(thing)), *methods])
+
+
+def _fields(thing: type) -> list[str]:
+    return [name for name in vars(thing).get("__annotations__", {}) if not name.startswith("_")]
 
 
 def _methods(thing: type) -> Iterator[tuple[str, Any, str]]:
@@ -108,10 +116,11 @@ def _name(field: ast.AnnAssign) -> str:
     return field.target.id if isinstance(field.target, ast.Name) else "_"
 
 
-def _docstring(thing: Any) -> str:
-    """Returns a docstring of Google's form as Markdown."""
+def _docstring(thing: Any, fields: Sequence[str] = ()) -> str:
+    """Returns a docstring of Google's form as Markdown. fields: of a class; where its text describes them one after the
+    other, as `name (shape): meaning.`, they become a list."""
     text, *sections = SECTION.split(inspect.getdoc(thing) or "")
-    parts = [_linked(text.strip())]
+    parts = [_with_fields(_linked(text.strip()), fields)]
     for title, body in zip(sections[::2], sections[1::2], strict=True):
         if title == "Returns":
             parts.append(f"**Returns** {_linked(' '.join(body.split()))}")
@@ -136,3 +145,20 @@ def _linked(text: str) -> str:
         return f"[`{found[1]}`](#{path.lower().replace('.', '')})" if path else found[0]
 
     return escaped(re.sub(r"`([\w.]+)`", link, text))
+
+
+def _with_fields(text: str, fields: Sequence[str]) -> str:
+    name = "|".join(map(re.escape, fields))
+    start = re.compile(rf"(?:(?<=[.;)\]] )|^)((?:{name})(?:\(\))?(?:, (?:{name}))*)((?: \([^:.]*\))?): ")
+    return "\n\n".join(_listed(part, start) for part in text.split("\n\n")) if fields else text
+
+
+def _listed(paragraph: str, start: re.Pattern[str]) -> str:
+    text = " ".join(paragraph.split())
+    found = list(start.finditer(text))
+    if len(found) < 2:
+        return paragraph
+    ends = [*(one.start() for one in found[1:]), len(text)]
+    meanings = (text[one.end() : end].strip(" ;") for one, end in zip(found, ends, strict=True))
+    rows = [f"- `{one[1]}`{one[2]}: {meaning}" for one, meaning in zip(found, meanings, strict=True)]
+    return "\n\n".join(filter(None, [text[: found[0].start()].strip(), "\n".join(rows)]))
