@@ -108,8 +108,3 @@ def test_every_name_is_defined_in_the_repository(tmp_path: Path) -> None:
     text = "\n".join(page.read_text(encoding="utf-8") for page in pages())
     rows = "\n".join(line for line in text.splitlines() if line.startswith("|"))
     assert not [f"{what} {name}" for what, found in defined.items() for name in found if f"`{name}`" not in rows]
-
-
-def test_every_public_name_has_a_heading() -> None:
-    headings = (ROOT / "docs" / "reference" / "python.md").read_text(encoding="utf-8").splitlines()
-    assert all(f"### {path}" in headings for paths in NAMES.values() for path in paths)

@@ -3,7 +3,7 @@
     python -m benchmarks pages [--check]
 
 A part stands between `<!-- generated: NAME -->` or `<!-- generated: NAME ARGUMENT -->` and `<!-- end -->`, each on a
-line of its own. PARTS in `benchmarks.pages.parts` has the names, `benchmarks.pages.places` the modules. --check names
+line of its own. PARTS in `benchmarks.pages.parts` has the names, places.toml the modules. --check names
 the pages that differ from the code, writes nothing, and ends with exit code 1 if there are any.
 """
 

@@ -10,7 +10,7 @@ from importlib import import_module
 from typing import Any
 
 from benchmarks.pages.markdown import cell, escaped, row, table
-from benchmarks.pages.places import NAMES, PUBLIC, WITHOUT_METHODS
+from benchmarks.pages.places import NAMES, PLACES
 
 WIDTH = 100
 PATHS = [path for paths in NAMES.values() for path in paths]
@@ -30,7 +30,7 @@ def section(name: str) -> str:
 
 def without_entry() -> list[str]:
     """Returns the public names that stand in no section."""
-    names = (f"{package}.{name}" for package in PUBLIC for name in import_module(package).__all__)
+    names = (f"{package}.{name}" for package in PLACES["public"] for name in import_module(package).__all__)
     return [name for name in names if name not in PATHS]
 
 
@@ -42,7 +42,9 @@ def _object(path: str) -> Any:
 def _entry(path: str, thing: Any) -> str:
     if not inspect.isclass(thing):
         return f"### {path}\n\n{_code(_signature(thing))}\n\n{_docstring(thing)}"
-    methods = [] if path in WITHOUT_METHODS else [_method(thing.__name__, *found) for found in _methods(thing)]
+    methods = (
+        [] if path in PLACES["without_methods"] else [_method(thing.__name__, *found) for found in _methods(thing)]
+    )
     return "\n\n".join([f"### {path}", _code(_head(thing)), _docstring(thing, _fields(thing)), *methods])
 
 

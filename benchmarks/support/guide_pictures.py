@@ -1,4 +1,4 @@
-"""Pictures of the guides and of the gallery: a curve, verdicts, contact sheets, a frame with tracks, replays."""
+"""Pictures of the guides and of the gallery: a curve, verdicts, contact sheets, replays."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def verdicts(out: Path) -> Path:
 
 
 def scenes(folder: Path, docs: Path) -> Iterator[Path]:
-    """Makes sheets and replays of the gallery, the sheet of the guide *Generate*, and a frame with tracks."""
+    """Makes sheets and replays of the gallery, and the sheets of two tutorials."""
     static = docs / "_static"
     for name, tracker in SCENES.items():
         made, tracks, replay = folder / name, folder / f"{name}-tracks", static / f"replay-{name}.html"
