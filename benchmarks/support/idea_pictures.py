@@ -103,7 +103,7 @@ def relational(path: Path) -> None:
     figure, axes = figure_of(2, 9.0, 2.6)
     begun, last = round(SEEN * FPS), round((SEEN + 2.0) * FPS)
     for one, name, says in zip(
-        axes, ("particle", "relational"), ("goes straight on", "walks with its partner"), strict=True
+        axes, ("particle", "relational"), ("goes straight on", "walks with the partner"), strict=True
     ):
         tracker = find(name)(find(name).config_class().with_set(EVERYBODY))
         tracker.reset(Context(FPS, float("nan")), 0)
