@@ -1,7 +1,9 @@
-"""Are rendered pictures and their pixel truth exact? And the gallery picture of the documentation.
+"""Are rendered pictures and their pixel truth exact? And pictures of the documentation.
 
-    python -m benchmarks.pictures exactness [--seed 40000] [--step 20] [scenario …]
-    python -m benchmarks.pictures gallery [--out docs/rendering.jpg]
+    python -m benchmarks pictures exactness [--seed 40000] [--step 20] [scenario …]
+    python -m benchmarks pictures gallery [--out docs/rendering.jpg]
+    python -m benchmarks pictures trackers
+    python -m benchmarks pictures guides
 
 exactness: the renderer against a slow one that casts every ray against everything (tests/reference_render.py), and the
 geometric visibility against that of the pixels, over the catalogue. Columns `ids`, `disparity`: pixels of 100,000, in
@@ -13,7 +15,8 @@ visible / amodal pixels, of people with at least 50 amodal pixels and no part ou
 visibility samples a grid of 16 x 32 points per person, orders people by distance, and takes people behind stairs for
 flat.
 gallery: one frame of several scenarios, most of them the quarter with most people; of `crowd` also the ids (left half)
-and disparities (right half, black where unknown).
+and disparities (right half, black where unknown). trackers: the idea of each tracker, in docs/trackers. guides:
+pictures of docs/guides, and of docs/start with their replays.
 """
 
 from __future__ import annotations
@@ -24,6 +27,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from benchmarks.support import guide_pictures, idea_pictures
 from benchmarks.support.options import new_parser
 from benchmarks.support.tables import head, row
 from scenarios.loading.resolve import load, names
@@ -146,15 +150,29 @@ def gallery(args: argparse.Namespace) -> None:
     print(args.out)
 
 
+def trackers(_: argparse.Namespace) -> None:
+    for name, draw in idea_pictures.PICTURES.items():
+        draw(Path("docs/trackers") / name)
+        print(name)
+
+
+def guides(_: argparse.Namespace) -> None:
+    for path in guide_pictures.write(Path("docs")):
+        print(path)
+
+
+MODES = {"exactness": exactness, "gallery": gallery, "trackers": trackers, "guides": guides}
+
+
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["exactness", "gallery"])
+    parser.add_argument("mode", choices=MODES)
     parser.add_argument("scenario", nargs="*", help="exactness: of the catalogue; all by default")
     parser.add_argument("--seed", type=int, default=40_000, help="exactness: seed of every scenario")
     parser.add_argument("--step", type=int, default=20, help="exactness: frames from one compared to the next")
     parser.add_argument("--out", type=Path, default=Path("docs/rendering.jpg"), help="gallery: the picture")
     args = parser.parse_intermixed_args()
-    {"exactness": exactness, "gallery": gallery}[args.mode](args)
+    MODES[args.mode](args)
 
 
 if __name__ == "__main__":

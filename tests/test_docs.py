@@ -1,15 +1,32 @@
-"""Links in the documents lead to files and headings, and every part that is made from the code can be made."""
+"""Links in the documents lead to files and headings; the parts that are made from the code are as the code.
+
+Every name that users meet has its definition in a page.
+"""
 
 from __future__ import annotations
 
-import importlib.util
 import re
 from pathlib import Path
-from types import ModuleType
 
+import pyarrow.parquet as pq
 import pytest
 
+from benchmarks.pages.blocks import BLOCK, differing, pages
+from benchmarks.pages.parts import PARTS, keys_of_scenarios
+from benchmarks.pages.places import CONFIGS, DOCSTRINGS, NAMES
+from benchmarks.pages.python_names import without_entry
+from scenarios.loading.resolve import names, suite_names
+from sim.dataset.generate import generate
 from tests.processes import ROOT
+from tracking.environment.observation import STATISTICS
+from tracking.errors.causes import CAUSES
+from tracking.recordings.source import open_source
+from tracking.running.run import track
+from tracking.running.tracker_registry import find
+from tracking.running.tracker_registry import names as trackers
+from tracking.scoring.catalogue import ALL
+from tracking.stress.axes import AXES
+from tracking.stress.failures import KINDS
 
 PAGES = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
 LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -37,33 +54,57 @@ def test_links(page: Path) -> None:
         name, _, anchor = link.partition("#")
         target = (page.parent / name).resolve() if name else page
         assert target.exists(), f"{link}: no such file"
-        if anchor and target.suffix == ".md" and "<!-- generated:" not in target.read_text(encoding="utf-8"):
+        if anchor and target.suffix == ".md":
             assert anchor in anchors(target), f"{link}: no such heading"
 
 
-@pytest.fixture(scope="module")
-def site() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("docs_conf", ROOT / "docs" / "conf.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+def test_parts_of_the_pages_are_as_the_code() -> None:
+    assert not differing(), "python -m benchmarks pages writes them"
 
 
-def test_generated_parts(site: ModuleType) -> None:
-    asked = {found[1] for page in PAGES for found in site.GENERATED.finditer(page.read_text(encoding="utf-8"))}
-    assert asked == site.PARTS.keys()
-    pages = [page for page in PAGES if page.name != "CONTRIBUTING.md"]
-    text = "\n".join(site.with_generated_parts(page.read_text(encoding="utf-8")) for page in pages)
-    assert "<!-- generated: " not in text.replace("`<!-- generated: NAME -->`", "")
-    for made in ("| `HOTA` |", "| `--shard-size SIZE` |", "| `gate` |", "| `merge` |", "camera.fps ", "eq. 2.2"):
-        assert made in text
+def test_every_part_is_used() -> None:
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages())
+    used = {(found[2], found[3]) for found in BLOCK.finditer(text)}
+    assert {name for name, _ in used} == PARTS.keys()
+    for part, known in (("docstring", DOCSTRINGS), ("parameters", CONFIGS), ("python", NAMES)):
+        assert {argument for name, argument in used if name == part} == known.keys()
+    begun = re.findall("^<!-- (?:generated|results): ", text, re.MULTILINE)
+    assert len(begun) == len(re.findall("^<!-- end -->$", text, re.MULTILINE))
 
 
-def test_public_names_have_an_entry(site: ModuleType) -> None:
-    assert site.undocumented() == []
+def test_public_names_have_an_entry() -> None:
+    assert without_entry() == []
 
 
-def test_every_key_of_a_scenario_has_a_meaning(site: ModuleType) -> None:
-    assert all(row["meaning"] for row in site.keys_of_scenarios())
+def test_every_key_of_a_scenario_has_a_meaning() -> None:
+    assert all(key["meaning"] for key in keys_of_scenarios())
+
+
+def columns(folder: Path) -> set[str]:
+    """The names of the columns of all files of a sequence and its run, with those of the tables of the run."""
+    small = ["duration=1", "camera.fps=5", "camera.image=[64, 48]"]
+    (made,) = generate(["side-by-side"], range(1), folder / "walks", set=small)
+    (sequence,) = open_source(made)
+    run = track("blob", sequence, detections="file")
+    run.write(folder / "run", sequence)
+    files = {name for path in folder.rglob("*.parquet") for name in pq.read_schema(path).names}
+    tables = {name for table in vars(run.tables()).values() for name in table.columns}
+    return {name for name in files if not name.startswith("cov_")} | tables
+
+
+def test_every_name_is_defined_in_the_repository(tmp_path: Path) -> None:
+    """In a row of a table of its own."""
+    defined = {
+        "score": [score.key for score in ALL],
+        "kind of error": KINDS,
+        "cause": CAUSES,
+        "axis": AXES,
+        "key": [key["key"] for key in keys_of_scenarios()],
+        "scenario or suite": [*names(), *suite_names()],
+        "parameter": [name for tracker in trackers() for name in find(tracker).config_class.params()],
+        "statistic": [statistic.name for statistic in STATISTICS],
+        "column": columns(tmp_path),
+    }
+    text = "\n".join(page.read_text(encoding="utf-8") for page in pages())
+    rows = "\n".join(line for line in text.splitlines() if line.startswith("|"))
+    assert not [f"{what} {name}" for what, found in defined.items() for name in found if f"`{name}`" not in rows]

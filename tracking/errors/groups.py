@@ -2,23 +2,24 @@
 
 A true group is found in a frame if an estimated group has more than half of the people of both (group_F1). A tracker of
 whole groups names no people: in its groups are the true people inside the hull or at most 0.3 m from it, as in the
-scores. A true group is in one of these states; a stretch of frames in one state is an error:
+scores. A stretch of frames in which a true group is not found in one and the same way is an error:
 
-    unseen            too few members are tracked: errors of people, not of the group
     missed group      its tracked members are in no group
-    divided group     its tracked members are in several groups, or some of them in none
+    divided group     its tracked members are in several groups, or some of them in none; also of a group that is found,
+                      if members outside are most of another estimated group
     engulfed group    most of it is in one group with most of another true group
     strangers joined  most of it is in one group with too many others
+    late merge        one of these that begins with a true merge, if the group is found before it ends
+    missed merge      one of these that begins with a true merge, if the group is not found before it ends
+    late split        one of these that begins with a true split, if the group is found before it ends
+    missed split      one of these that begins with a true split, if the group is not found before it ends
+    late group        a missed group that begins with the group itself and is found later
+    false group       an estimated group that finds no true group, and has nobody of a group that is not found
+    wrong lineage     a merge or split that was reported with the right kind, start and people, but with other groups
+                      before or after than the true event has, as in lineage_accuracy; from the event to the report
 
-Groups that are engulfed in one estimated group at the same time are one error, which names them all.
-
-A group that is found is divided, too, if members outside are most of another estimated group. A stretch that begins
-with a true merge is a *late merge*, or a *missed merge* if the group is not found before it ends; one that begins with
-a true split likewise. A missed group that begins with the group itself and is found later is a *late group*. A *false
-group* finds no true group, and has nobody of a group that is not found.
-
-A *wrong lineage* is a merge or split that was reported (tracking.scoring.events: same kind, start and people), with
-other groups before or after than the true event has, as in lineage_accuracy. It lasts from the event to the report.
+A group of which too few members are tracked is *unseen*: these are errors of people, not of the group. Groups that are
+engulfed in one estimated group at the same time are one error, which names them all.
 """
 
 from __future__ import annotations

@@ -1,17 +1,16 @@
 """Errors of people: switches, fragments, misses, late confirmations and ghosts, from the matches of CLEAR.
 
 A true person is matched with at most one track in a frame. A stretch of frames in which a person is present and not
-matched is a *gap*. It is named by what comes before and after:
+matched is a *gap*.
 
-    before       after                 kind
-    –            matched               late      the track was confirmed late
-    –            –                     miss      the person was never tracked
-    matched      –                     miss      the track ended early
-    matched      the same track        fragment
-    matched      another track         switch    a switch without a gap has no frames without a match
+    late        a gap before the first match of the person: the track was confirmed late
+    miss        a gap after which the person is not matched again: the track ended early, or there never was one
+    fragment    a gap between two matches with the same track
+    switch      a match with another track than in the match before, after a gap or without one
+    ghost       a stretch of frames in which a track is reported and not matched
 
-A stretch of frames in which a track is reported and not matched is a *ghost*. The number of switches is IDSW, that of
-fragments and of switches after a gap is Frag. The frames of all gaps sum to FN, those of all ghosts to FP.
+The number of switches is IDSW, that of fragments and of switches after a gap is Frag. The frames of all gaps sum to FN,
+those of all ghosts to FP.
 """
 
 from __future__ import annotations

@@ -1,9 +1,12 @@
 """When a tracker fails: a score beyond a bound, or an error of a kind; and one episode in which it may fail.
 
-`HOTA<0.7` compares a score of the catalogue by <, <=, > or >=. A perfect tracker must not fulfil it. It counts only
-where the oracle has the score, too: a false group in a scene without true groups is no failure of group_F1. `late
-split` is a kind of error of `flockscope errors` that occurs at least once, `switch:hidden` one of this kind with this
-cause. `crash` is an error that the tracker raises.
+    HOTA<0.7         a score of the catalogue beyond a bound, by <, <=, > or >=; a perfect tracker must not be beyond it
+    late split       a kind of error of `flockscope errors` that occurs at least once
+    switch:hidden    an error of this kind with this cause
+    crash            an error that the tracker raises
+
+A score counts only where the oracle has it, too: a false group in a scene without true groups is no failure of
+group_F1.
 
 An error that the start explains does not count: it must last until its people have been in view for the time that a
 tracker needs to report them, 0.5 s, or their group, 2 s. Else each failure would become a scene of a few frames.

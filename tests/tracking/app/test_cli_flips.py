@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import re
-import runpy
 import shutil
 from functools import cache
 from pathlib import Path
@@ -12,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.pages.parts import keys_of_scenarios
 from scenarios.errors import InputError
 from scenarios.loading.toml_files import apply_settings
 from scenarios.loading.validation import validate
@@ -19,7 +19,7 @@ from scenarios.schema.scenario import Scenario
 from sim.store.sequence_folder import sequence_files
 from sim.store.track_files import tracks_files
 from tests.commands import commands
-from tests.processes import FAKE, ROOT
+from tests.processes import FAKE
 from tracking import track
 from tracking.app.cli import run
 from tracking.running import tracker_registry
@@ -160,7 +160,7 @@ def differ(before: str, after: str) -> bool:
 
 
 def test_every_key_is_in_the_table():
-    known = {row["key"] for row in runpy.run_path(str(ROOT / "docs/conf.py"))["keys_of_scenarios"]()}
+    known = {row["key"] for row in keys_of_scenarios()}
     when = {key for key in known if ".when." in key} | {key for key in known if key.endswith(".type")}
     profile = {key for key in known if key.removeprefix("sensor.").startswith(PROFILE) and key.startswith("sensor.")}
     assert known - when - profile == set(KEYS) | set(PICTURES) | TEXT_ONLY

@@ -111,7 +111,10 @@ def test_who_belongs_together(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", ["generate", "write-a-scenario", "track-and-score", "your-own-tracker", "python"])
+@pytest.mark.parametrize(
+    "name",
+    ["../start/first-ten-minutes", "generate", "write-a-scenario", "track-and-score", "your-own-tracker", "python"],
+)
 def test_without_recordings(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     follow(name, False, capsys)

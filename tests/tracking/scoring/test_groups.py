@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from tracking.scoring.people_and_groups import true_groups, true_people
 
 from sim.geometry.polygons import footprint_hulls
 from tests.hand_made import Scene, event, tracks, truth
 from tracking.scoring import evaluate
-from tracking.scoring.people_and_groups import true_groups, true_people
 
 APART = {1: (0.5, 0.5), 2: (1.5, 0.5), 3: (3.2, 0.5), 4: (3.8, 0.5)}
 

@@ -1,0 +1,26 @@
+"""Pages whose parts are made from the code: `<!-- generated: NAME -->` to `<!-- end -->`."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from benchmarks.pages.parts import PARTS, ROOT
+
+BLOCK = re.compile(r"^(<!-- generated: (\S+) ?(\S*) -->\n).*?^(<!-- end -->)$", re.DOTALL | re.MULTILINE)
+
+
+def pages() -> list[Path]:
+    """Returns all pages that may have such parts."""
+    return sorted((ROOT / "docs").rglob("*.md"))
+
+
+def with_parts(text: str) -> str:
+    """Returns the text of a page with its parts made anew. Raises KeyError if a block names no part."""
+    return BLOCK.sub(lambda m: f"{m[1]}\n{PARTS[m[2]](*filter(None, [m[3]])).strip()}\n\n{m[4]}", text)
+
+
+def differing() -> list[str]:
+    """Returns the paths of the pages of which a part differs from the code."""
+    texts = {page: page.read_text(encoding="utf-8") for page in pages()}
+    return [page.relative_to(ROOT).as_posix() for page, text in texts.items() if with_parts(text) != text]
