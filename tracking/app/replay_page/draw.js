@@ -1,6 +1,7 @@
 // Colours, shapes, labels and trails that plan, image and whole groups share.
 
 const TRAIL_SECONDS = 3;
+const NARROW = 560; // px: panes of a narrower canvas stand one above the other
 const darkQuery = matchMedia("(prefers-color-scheme: dark)");
 // Colour-blind readers can tell them apart; their contrast to the background is 3 : 1 or more.
 const COLOURS = {
@@ -8,8 +9,8 @@ const COLOURS = {
   dark: ["#56b4e9", "#f0963c", "#2fc79a", "#e58fc0", "#b3a1f0", "#e0c341", "#ff7b72", "#7fd4e8", "#a3d15c", "#d6a07a"],
 };
 const THEMES = {
-  light: { ground: "#fbfcfd", grid: "#e6eaee", wall: "#2d333b", thing: "#656d76", floor: "#eef1f4", ink: "#1b1f24", halo: "#ffffff", alone: "#656d76", found: "#1b1f24" },
-  dark: { ground: "#12171d", grid: "#232b34", wall: "#c5ccd4", thing: "#8b949e", floor: "#1d242c", ink: "#e8ecf1", halo: "#0f1318", alone: "#8b949e", found: "#e8ecf1" },
+  light: { ground: "#fbfcfd", grid: "#e6eaee", wall: "#2d333b", thing: "#656d76", floor: "#eef1f4", ink: "#1b1f24", halo: "#ffffff", alone: "#656d76", found: "#1b1f24", error: "#d1242f" },
+  dark: { ground: "#12171d", grid: "#232b34", wall: "#c5ccd4", thing: "#8b949e", floor: "#1d242c", ink: "#e8ecf1", halo: "#0f1318", alone: "#8b949e", found: "#e8ecf1", error: "#ff6b5e" },
 };
 let theme = THEMES.light, palette = COLOURS.light;
 
@@ -175,6 +176,29 @@ function splitPanes(shown, beside) {
 function paneTitle(parts, shown) {
   if (parts.length < 2) return "";
   return other ? shown[shown.length - 1].word : shown[0].name;
+}
+
+// Divides a canvas into panes: side by side, on a narrow page one above the other. aspect: of a pane. draw is called for
+// each pane with its number and size.
+function drawPanes(canvas, count, aspect, draw) {
+  const down = count > 1 && canvas.clientWidth < NARROW, across = down ? 1 : count;
+  const [ctx, width, height] = prepareCanvas(canvas, aspect * (down ? count : 1 / count));
+  const w = width / across, h = height / (down ? count : 1);
+  for (let k = 0; k < count; k++) draw(k, ctx, down ? 0 : k * w, down ? k * h : 0, w, h);
+}
+
+// The errors that are shown at a frame, at least for a second: the latest first.
+function errorsAt(side, frame) {
+  return data.errors
+    .filter(error => error.side === side.name && error.start <= frame && frame <= Math.max(error.end, error.start + data.fps))
+    .sort((a, b) => b.start - a.start);
+}
+
+// [side, row] of the people and ghosts that the errors of the shown tracks concern at a frame.
+function rowsInError(shown, frame) {
+  const now = shown.filter(side => side.tracked).flatMap(side => errorsAt(side, frame));
+  const people = new Set(now.flatMap(error => error.people)), ghosts = new Set(now.filter(error => !error.people.length).map(error => error.after));
+  return shown.flatMap(side => [...side.rows(frame)].filter(row => (side.tracked ? ghosts : people).has(side.id[row])).map(row => [side, row]));
 }
 
 function inPane(ctx, x, y, width, height, title, draw) {

@@ -3,13 +3,10 @@
 function drawImage(canvas, frame, options) {
   const [imageWidth, imageHeight] = data.image;
   const parts = splitPanes(sides.filter(side => options[side.name]), options.beside);
-  const [ctx, width, height] = prepareCanvas(canvas, imageHeight / imageWidth / parts.length);
-  const w = width / parts.length, scale = w / imageWidth;
-  parts.forEach((shown, k) => {
-    const title = paneTitle(parts, shown);
-    inPane(ctx, k * w, 0, w, height, title, () => {
-      const overPicture = options.video && (player ? player.draw(ctx, w, height) : drawBackground(ctx, w, height));
-      imagePane({ ctx, width: w, height, scale, frame, options, overPicture, taken: [] }, shown);
+  drawPanes(canvas, parts.length, imageHeight / imageWidth, (k, ctx, x, y, w, h) => {
+    inPane(ctx, x, y, w, h, paneTitle(parts, parts[k]), () => {
+      const overPicture = options.video && (player ? player.draw(ctx, w, h) : drawBackground(ctx, w, h));
+      imagePane({ ctx, width: w, height: h, scale: w / imageWidth, frame, options, overPicture, taken: [] }, parts[k]);
     });
   });
 }
@@ -31,6 +28,22 @@ function imagePane(pane, shown) {
   if (pane.options.detections && found) drawImageDetections(pane);
   for (const side of people) drawImageBoxes(pane, side);
   if (pane.options.ids) for (const [side, map] of wholeGroups) drawWholeGroupIds(pane, side, map);
+  for (const [side, row] of rowsInError(shown, pane.frame)) drawImageError(pane, side, row);
+}
+
+// A frame round somebody whom an error concerns.
+function drawImageError({ ctx, scale }, side, row) {
+  const box = boxOf(side, row, scale);
+  ctx.strokeStyle = theme.error;
+  ctx.lineWidth = 3.5;
+  if (box) ctx.strokeRect(box[0] - 5, box[1] - 5, box[2] + 10, box[3] + 10);
+  else strokeLine(ctx, footRing(side, row, scale, 1.4 * BODY.track));
+}
+
+// The corners, in px, of a ring of radius r m on the ground round a person's feet; [] where the camera cannot see it.
+function footRing(side, row, scale, r = BODY.track) {
+  const turns = Array.from({ length: 25 }, (_, k) => (k * Math.PI) / 12), map = toImage(side, scale);
+  return map ? mapAll(turns.map(t => [side.x[row] + r * Math.cos(t), side.y[row] + r * Math.sin(t)]), map) : [];
 }
 
 // A function from x, y in a side's plane to px of the pane, or to null for a point that the camera cannot see.
@@ -76,6 +89,17 @@ function drawImageBoxes({ ctx, scale, frame, options, overPicture, taken }, side
       ctx.arc(side.x[row] * scale, side.y[row] * scale, 6, 0, 2 * Math.PI);
       ctx.stroke();
       if (ids) label(ctx, side.id[row], side.x[row] * scale, side.y[row] * scale - 9, colour);
+    } else {
+      const ring = footRing(side, row, scale);
+      ctx.setLineDash([]);
+      ctx.lineWidth = 3;
+      for (const look of [theme.halo, colour]) {
+        ctx.strokeStyle = look;
+        strokeLine(ctx, ring);
+        ctx.lineWidth = 2;
+      }
+      const spots = ([p, q]) => [[0, 1], [1, 0], [-1, 0]].map(([a, b]) => [ring[6][0] + a * (p + 10), ring[18][1] + b * (q + 3)]);
+      if (ids && ring.length) placeLabel(ctx, taken, side.id[row], spots, colour, tracked);
     }
   }
   ctx.setLineDash([]);
@@ -98,6 +122,7 @@ function drawImageHulls({ ctx, scale, frame, options, taken }, side) {
       const box = boxOf(side, row, scale);
       if (box) for (const [p, q] of [[0, 0], [1, 0], [0, 1], [1, 1]]) points.push([box[0] + p * box[2], box[1] + q * box[3]]);
       else if (side.plane === "image") points.push([side.x[row] * scale, side.y[row] * scale]);
+      else points.push(...footRing(side, row, scale));
     }
     if (!points.length) continue;
     roundedPath(ctx, points, tracked ? 8 : 5);

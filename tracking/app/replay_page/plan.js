@@ -25,7 +25,7 @@ function zoomTo(times) {
 }
 
 function listenToZoom(canvas, show) {
-  const inPane = event => [event.offsetX % zoom.width, event.offsetY];
+  const inPane = event => [event.offsetX % zoom.width, event.offsetY % zoom.height];
   canvas.addEventListener("wheel", event => {
     event.preventDefault();
     zoomBy(event.deltaY < 0 ? 1.25 : 0.8, ...inPane(event));
@@ -46,13 +46,11 @@ function drawPlan(canvas, frame, options) {
   const [x0, y0, x1, y1] = data.bounds;
   const there = sides.filter(side => options[side.name]);
   const parts = splitPanes(there.filter(side => side.plane === "ground"), options.beside);
-  const own = Math.min(Math.max((y1 - y0) / (x1 - x0), 0.35), 1.1);
-  const aspect = (hasImage ? data.image[1] / data.image[0] : own) / splitPanes(there, options.beside).length;
-  const [ctx, width, height] = prepareCanvas(canvas, aspect);
-  const w = width / parts.length;
-  parts.forEach((shown, k) => {
-    const title = paneTitle(parts, shown);
-    inPane(ctx, k * w, 0, w, height, title, () => planPane(ctx, w, height, shown, frame, options));
+  const own = Math.min(Math.max((y1 - y0) / (x1 - x0), 0.35), data.opening ? 0.5 : 1.1);
+  const panes = splitPanes(there, options.beside).length;
+  const aspect = (hasImage && !data.opening ? data.image[1] / data.image[0] : own) * parts.length / panes;
+  drawPanes(canvas, parts.length, aspect, (k, ctx, x, y, w, h) => {
+    inPane(ctx, x, y, w, h, paneTitle(parts, parts[k]), () => planPane(ctx, w, h, parts[k], frame, options));
   });
 }
 
@@ -74,6 +72,13 @@ function planPane(ctx, width, height, shown, frame, options) {
   if (options.trails) for (const side of people) drawTrails(plan, side, map);
   if (options.detections && found && found.plane !== "image") drawPlanDetections(plan);
   for (const side of people) drawPlanPeople(plan, side);
+  for (const [side, row] of rowsInError(shown, frame)) {
+    ctx.strokeStyle = theme.error;
+    ctx.lineWidth = 3;
+    ctx.beginPath();
+    ctx.arc(...positionOf(plan, side, row), Math.max(0.6 * scale, 11), 0, 2 * Math.PI);
+    ctx.stroke();
+  }
   if (options.ids) drawPersonIds(plan, people.filter(side => side.rows(frame).length <= MANY));
   if (options.ids) for (const side of wholeGroups) drawWholeGroupIds(plan, side, map);
 }
