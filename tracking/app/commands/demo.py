@@ -41,12 +41,11 @@ SCENES = ("merge", "split", "cross", "queue")
 SEEDS = range(40_000, 40_002)
 QUICK_SCENES, QUICK_SEEDS = ("quick",), range(40_000, 40_001)
 QUICK_TRACKERS = ("blob", "group-pda")  # one that reports people, one that reports groups
-SWEEP_SEEDS = 40_000, 40_001, 40_002
 SWEEP_VALUES, SWEEP_SETTINGS = 4, ("camera.fps=5", "duration=12")
 
 # The scene that is drawn, and tracked from its pictures, too: light ground, varied clothes, people who come near.
 PIXEL_SCENE, PIXEL_SEED = "merge", range(40_017, 40_018)
-NEAR = ("duration=13", "camera.tilt_deg=25", "picture.texture=0.3", "sensor.detect_prob=0.8")
+NEAR = ("duration=10", "camera.tilt_deg=18", "picture.texture=0.3", "sensor.detect_prob=0.8")
 PIXEL_SETTINGS = (*NEAR, "camera.image=[640,360]")
 QUICK_PIXEL_SETTINGS = (*NEAR, "camera.image=[480,270]", "camera.fps=5")
 PIXELS = f"{PIXEL_SCENE} from pixels"
@@ -90,9 +89,9 @@ def demo(options: DemoOptions) -> CommandResult:
         _compiled_ahead() as compiled, start_workers(1 if quick else os.cpu_count() or 1) as run,
         ProgressMeter("demo") as meter,
     ):  # fmt: skip
-        count, sweep_seeds = len(SCENES) * len(seeds), SWEEP_SEEDS[: 2 if quick else None]
+        count = len(SCENES) * len(seeds)
         meter.total = count * 2 + DRAWING + 2 + TRACKING * (len(trackers) + len(of_pixels))
-        meter.total += SWEEP_VALUES * len(sweep_seeds) * len(trackers)
+        meter.total += SWEEP_VALUES * len(SEEDS) * len(trackers)
         folders = generate(scenes, seeds, out / "data", progress=lambda *_: meter.step("simulate"), streams=())
         folders += generate(
             [PIXEL_SCENE], PIXEL_SEED, out / "pictures", set=settings, streams=("left",), images="mp4"
@@ -108,7 +107,7 @@ def demo(options: DemoOptions) -> CommandResult:
             meter.step("score")
         sequences = [open_source(folder)[0] for folder in folders]
         report = report_of_runs(trackers, sequences, found[:-1], None, {})
-        curves = _curves(trackers, report.by, sweep_seeds, run, out, meter.step)
+        curves = _curves(trackers, report.by, run, out, meter.step)
     seen = replace(sequences[-1], name=f"{PIXELS}-s{PIXEL_SEED[0]}")
     pixels = report_of_runs(of_pixels, [seen], found[-1:], report.by, {})
     assert report.heat is not None
@@ -118,16 +117,16 @@ def demo(options: DemoOptions) -> CommandResult:
     write_report(
         replace(
             report, title=f"flockscope demo: {report.title}", about=ABOUT, heat=replace(report.heat, rows=rows),
-            curves=curves, moments=[*report.moments, *pixels.moments], opening=_opening(sequences[-1], sides[-1], out),
+            curves=curves, moments=[*report.moments, *pixels.moments], opening=_opening(sequences[-1], *sides[-1], out),
             sequences=[
-                (" · ".join([one.name, *(run.tracker for run, _ in runs)]), f"pages/{address(_page(one))}", runs[-1][1])
-                for one, runs in zip(sequences, sides, strict=True)
+                (" · ".join([one.name, *(run.tracker for run in runs)]), f"pages/{address(_page(one))}", scores[-1])
+                for one, (runs, _, scores) in zip(sequences, sides, strict=True)
             ],
         ),
         page,
     )  # fmt: skip
-    for one, runs in zip(sequences[:-1], sides, strict=False):
-        write_page(one, [run for run, _ in runs], out / "pages" / _page(one))
+    for one, (runs, *_) in zip(sequences[:-1], sides, strict=False):
+        write_page(one, runs, out / "pages" / _page(one))
     every = [row for row in (*report.ranking, *pixels.ranking) if row["first"] is not None]
     cells = [[f"{r['run']}, from {r['input'].split()[0]}", *(number(k, r[k]) for k in COLUMNS)] for r in every]
     lines = [table("", ["tracker"], COLUMNS, cells)]
@@ -163,9 +162,7 @@ def _judged(task: tuple[Path, list[Path]]) -> JudgedRuns:
     return judge(sequence, job)
 
 
-def _curves(
-    trackers: Iterable[str], by: str, seeds: tuple[int, ...], run: RunItems, out: Path, step: Callable[[str], None]
-) -> Curves:
+def _curves(trackers: Iterable[str], by: str, run: RunItems, out: Path, step: Callable[[str], None]) -> Curves:
     """Plays the trackers with fewer and fewer detections and returns their mean scores."""
     from sim.workers.start import results_in_order
     from tracking.stress.axes import parse_axis
@@ -173,16 +170,16 @@ def _curves(
     from tracking.stress.sweep import Plan, Sweep
 
     axis, unknown = parse_axis("detection"), [None] * SWEEP_VALUES
-    plan = Plan((PIXEL_SCENE,), (axis,), seeds, len(seeds), by, 0.8, "file", SWEEP_SETTINGS)
+    plan = Plan((PIXEL_SCENE,), (axis,), tuple(SEEDS), len(SEEDS), by, 0.8, "file", SWEEP_SETTINGS)
     sweep = Sweep(
         plan, {name: contender(name) for name in trackers}, lambda scenes: results_in_order(run, play_scene, scenes),
         Store(out / "episodes.jsonl", fresh=True), step,
     )  # fmt: skip
-    sweep.values, sweep.seeds = [(value,) for value in axis.spread(SWEEP_VALUES)], len(seeds)
+    sweep.values, sweep.seeds = [(value,) for value in axis.spread(SWEEP_VALUES)], len(SEEDS)
     sweep.play_values()
-    means = {name: [mean_of_finite(at) for at in sweep.scores(name).T] for name in (*trackers, *sweep.oracle_names)}
+    means = {name: [mean_of_finite(at) for at in sweep.scores(name).T] for name in (*trackers, sweep.oracle_names[0])}
     curves = {name: {"mean": mean, "low": unknown, "high": unknown, "break": None} for name, mean in means.items()}
-    words = [f"Mean of {counted(len(seeds), 'scene')} of {PIXEL_SCENE}; so few give no interval."]
+    words = [f"Mean of {counted(len(SEEDS), 'scene')} of {PIXEL_SCENE}; so few give no interval."]
     return Curves(axis.name, axis.about, [value for (value,) in sweep.values], curves, {}, words)
 
 
@@ -195,32 +192,30 @@ def _cells(ranking: SequenceOf[Json], columns: Iterable[str]) -> list[HeatCell]:
 
 def _best_and_worst(
     sequence: Sequence, judged: JudgedRuns, trackers: SequenceOf[str], by: str
-) -> list[tuple[Run, float]]:
-    """Returns the runs with the highest and the lowest score on a sequence, and the scores: HOTA if two or more have
-    it."""
+) -> tuple[list[Run], str, list[float]]:
+    """Returns the runs with the highest and the lowest score on a sequence, the key of the score, and their scores. The
+    score is HOTA if two or more runs have it, else `by`."""
     for key in ("HOTA", by):
         found = {k: s[key] for k, s in enumerate(judged.scored.scores) if math.isfinite(s[key])}
         if len(found) > 1:
             break
     ends = dict.fromkeys([max(found, key=found.__getitem__), min(found, key=found.__getitem__)])
     tracks = read_runs(sequence, replace(judged.job, sources=tuple(judged.job.sources[k] for k in ends)))
-    return [
-        (Run(tracked, judged.errors[k].errors, trackers[k]), found[k]) for k, tracked in zip(ends, tracks, strict=True)
-    ]
+    runs = [Run(tracked, judged.errors[k].errors, trackers[k]) for k, tracked in zip(ends, tracks, strict=True)]
+    return runs, key, [found[k] for k in ends]
 
 
 def _page(sequence: Sequence) -> Path:
     return Path(f"{sequence.name}.html")
 
 
-def _opening(sequence: Sequence, sides: SequenceOf[tuple[Run, float]], out: Path) -> Opening:
+def _opening(sequence: Sequence, runs: list[Run], key: str, scores: list[float], out: Path) -> Opening:
     """Writes the replay of a sequence with pictures, and returns it as the report's opening."""
-    (best, high), (worst, low) = sides[0], sides[-1]
-    runs, page = [run for run, _ in sides], out / "pages" / _page(sequence)
+    page = out / "pages" / _page(sequence)
     video = page_video(sequence, page, "inside")
     assert video is not None
     write_page(sequence, runs, page, video)
-    dearest = dearest_error(worst.errors)
+    dearest = dearest_error(runs[-1].errors)
     first = 1 if dearest is None else dearest.error.start
     data = page_data(sequence, runs, start=max(first - round(BEFORE * sequence.fps), 1))
     picture = frame_pictures(sequence, [None, *(run.tracks for run in runs)], first + round(sequence.fps))
@@ -231,8 +226,8 @@ def _opening(sequence: Sequence, sides: SequenceOf[tuple[Run, float]], out: Path
         data_address(cv2.resize(picture, size, interpolation=cv2.INTER_AREA)),
     )  # fmt: skip
     words = (
-        f"{best.tracker} (HOTA {high:.2f}) and {worst.tracker} ({low:.2f}) follow two groups that merge. Solid: the "
-        "truth; dashed: the tracker. Red: an error, in words below."
+        f"{' and '.join(f'{run.tracker} ({key} {score:.2f})' for run, score in zip(runs, scores, strict=True))} follow "
+        "two groups that merge. Solid: the truth. Dashed: the tracker. Red: an error, named below."
     )
     return Opening(words, html, f"pages/{address(_page(sequence))}")
 

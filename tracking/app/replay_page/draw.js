@@ -209,7 +209,8 @@ function inPane(ctx, x, y, width, height, title, draw) {
   ctx.translate(x, y);
   draw();
   if (title) {
-    label(ctx, title, width / 2, 17, theme.ink, true);
+    ctx.font = font(true);
+    label(ctx, title, 10 + ctx.measureText(title).width / 2, 19, theme.ink, true);
     ctx.fillStyle = theme.thing;
     ctx.fillRect(x ? 0 : width - 1, 0, 1, height);
   }

@@ -26,7 +26,7 @@ function imagePane(pane, shown) {
   if (pane.options.hulls) for (const side of people) drawImageHulls(pane, side);
   for (const [side, map] of wholeGroups) drawWholeGroups(pane, side, map);
   if (pane.options.detections && found) drawImageDetections(pane);
-  for (const side of people) drawImageBoxes(pane, side);
+  for (const side of people) if (side.tracked || !data.opening) drawImageBoxes(pane, side);
   if (pane.options.ids) for (const [side, map] of wholeGroups) drawWholeGroupIds(pane, side, map);
   for (const [side, row] of rowsInError(shown, pane.frame)) drawImageError(pane, side, row);
 }

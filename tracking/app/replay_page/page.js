@@ -31,6 +31,7 @@ function seekTo(frame) {
 function show() {
   const frame = state.frame;
   $("stages").classList.toggle("beside", options.beside && sides.filter(side => options[side.name]).length > 1);
+  if (data.opening) follow();
   if (hasPlan) drawPlan($("plan"), frame, options);
   showImage();
   if (line) line.move(frame);
@@ -318,6 +319,7 @@ function seekToAddress() {
 }
 
 document.body.classList.toggle("opening", Boolean(data.opening));
+if (data.opening) zoom.times = FOLLOWED;
 if (player) $("under").append(player.video);
 buildHead();
 buildControls();

@@ -2,6 +2,7 @@
 
 const BODY = { shoulder: 0.24, depth: 0.13, head: 0.1, footprint: 0.25, track: 0.36 };
 const MANY = 80;
+const FOLLOWED = 2.2; // times that the plan is enlarged at the head of a report
 const zoom = { times: 1, centre: [0, 0], scale: 1, width: 1, height: 1 }; // the plan's, and the size of a pane in px
 
 // Zooms so that the place under a pixel of a pane stays there.
@@ -22,6 +23,13 @@ function zoomTo(times) {
   const mean = values => values.reduce((a, b) => a + b, 0) / values.length, use = own.length ? own : rows;
   if (use.length) zoom.centre = [mean(use.map(row => shown.x[row])), mean(use.map(row => shown.y[row]))];
   zoom.times = times;
+}
+
+// Keeps the people in groups in the middle, until somebody zooms.
+function follow() {
+  const rows = truth ? [...truth.rows(state.frame)].filter(row => truth.group[row] >= 0) : [];
+  const mean = values => rows.reduce((sum, row) => sum + values[row], 0) / rows.length;
+  if (rows.length && zoom.times === FOLLOWED) zoom.centre = [mean(truth.x), mean(truth.y)];
 }
 
 function listenToZoom(canvas, show) {
