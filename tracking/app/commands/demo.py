@@ -215,9 +215,10 @@ def _opening(sequence: Sequence, runs: list[Run], key: str, scores: list[float],
     video = page_video(sequence, page, "inside")
     assert video is not None
     write_page(sequence, runs, page, video)
-    dearest = dearest_error(runs[-1].errors)
-    first = 1 if dearest is None else dearest.error.start
-    data = page_data(sequence, runs, start=max(first - round(BEFORE * sequence.fps), 1))
+    early = round(BEFORE * sequence.fps)
+    dearest = dearest_error([error for error in runs[-1].errors if error.error.start > early])
+    first = early + 1 if dearest is None else dearest.error.start
+    data = page_data(sequence, runs, start=first - early)
     picture = frame_pictures(sequence, [None, *(run.tracks for run in runs)], first + round(sequence.fps))
     size = STILL_WIDTH, round(len(picture) * STILL_WIDTH / picture.shape[1])
     title = f"Truth, {', '.join(run.tracker for run in runs)}"

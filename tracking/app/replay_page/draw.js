@@ -187,18 +187,24 @@ function drawPanes(canvas, count, aspect, draw) {
   for (let k = 0; k < count; k++) draw(k, ctx, down ? 0 : k * w, down ? k * h : 0, w, h);
 }
 
-// The errors that are shown at a frame, at least for a second: the latest first.
+// The latest errors of a side that are shown at a frame, each at least for a second; at most two.
 function errorsAt(side, frame) {
   return data.errors
     .filter(error => error.side === side.name && error.start <= frame && frame <= Math.max(error.end, error.start + data.fps))
-    .sort((a, b) => b.start - a.start);
+    .sort((a, b) => b.start - a.start).slice(0, 2);
 }
 
-// [side, row] of the people and ghosts that the errors of the shown tracks concern at a frame.
-function rowsInError(shown, frame) {
-  const now = shown.filter(side => side.tracked).flatMap(side => errorsAt(side, frame));
-  const people = new Set(now.flatMap(error => error.people)), ghosts = new Set(now.filter(error => !error.people.length).map(error => error.after));
-  return shown.flatMap(side => [...side.rows(frame)].filter(row => (side.tracked ? ghosts : people).has(side.id[row])).map(row => [side, row]));
+// Draws a line round the people, or the ghost, of each error of the shown tracks. reach: the points in px of [side, row]
+// that the line goes round, at a distance of r px.
+function drawErrorsHere({ ctx, frame }, shown, r, reach) {
+  ctx.strokeStyle = theme.error;
+  ctx.lineWidth = 3;
+  for (const run of shown.filter(side => side.tracked)) for (const { people, after } of errorsAt(run, frame)) {
+    const side = people.length ? shown.find(one => !one.tracked) : run, ids = people.length ? people : [after];
+    const points = side ? [...side.rows(frame)].filter(row => ids.includes(side.id[row])).flatMap(row => reach(side, row)) : [];
+    roundedPath(ctx, points.filter(p => !Number.isNaN(p[0])), r);
+    ctx.stroke();
+  }
 }
 
 function inPane(ctx, x, y, width, height, title, draw) {

@@ -28,22 +28,20 @@ function imagePane(pane, shown) {
   if (pane.options.detections && found) drawImageDetections(pane);
   for (const side of people) if (side.tracked || !data.opening) drawImageBoxes(pane, side);
   if (pane.options.ids) for (const [side, map] of wholeGroups) drawWholeGroupIds(pane, side, map);
-  for (const [side, row] of rowsInError(shown, pane.frame)) drawImageError(pane, side, row);
+  drawErrorsHere(pane, shown, 7, (side, row) => cornersOf(side, row, pane.scale));
 }
 
-// A frame round somebody whom an error concerns.
-function drawImageError({ ctx, scale }, side, row) {
+// The corners, in px, of a box, or of a ring round the feet of somebody without one.
+function cornersOf(side, row, scale) {
   const box = boxOf(side, row, scale);
-  ctx.strokeStyle = theme.error;
-  ctx.lineWidth = 3.5;
-  if (box) ctx.strokeRect(box[0] - 5, box[1] - 5, box[2] + 10, box[3] + 10);
-  else strokeLine(ctx, footRing(side, row, scale, 1.4 * BODY.track));
+  return box ? [[0, 0], [1, 0], [0, 1], [1, 1]].map(([p, q]) => [box[0] + p * box[2], box[1] + q * box[3]]) : footRing(side, row, scale);
 }
 
-// The corners, in px, of a ring of radius r m on the ground round a person's feet; [] where the camera cannot see it.
-function footRing(side, row, scale, r = BODY.track) {
+// The points, in px, of a ring on the ground round a person's feet; [] where the camera cannot see it.
+function footRing(side, row, scale) {
   const turns = Array.from({ length: 25 }, (_, k) => (k * Math.PI) / 12), map = toImage(side, scale);
-  return map ? mapAll(turns.map(t => [side.x[row] + r * Math.cos(t), side.y[row] + r * Math.sin(t)]), map) : [];
+  const reach = side.plane === "image" ? 0 : BODY.track;
+  return map ? mapAll(turns.map(t => [side.x[row] + reach * Math.cos(t), side.y[row] + reach * Math.sin(t)]), map) : [];
 }
 
 // A function from x, y in a side's plane to px of the pane, or to null for a point that the camera cannot see.
@@ -117,13 +115,7 @@ function strokeBoxRim(ctx, box, colour) {
 function drawImageHulls({ ctx, scale, frame, options, taken }, side) {
   const { tracked } = side;
   for (const [id, rows] of groupsAt(side, frame)) {
-    const points = [];
-    for (const row of rows) {
-      const box = boxOf(side, row, scale);
-      if (box) for (const [p, q] of [[0, 0], [1, 0], [0, 1], [1, 1]]) points.push([box[0] + p * box[2], box[1] + q * box[3]]);
-      else if (side.plane === "image") points.push([side.x[row] * scale, side.y[row] * scale]);
-      else points.push(...footRing(side, row, scale));
-    }
+    const points = rows.flatMap(row => cornersOf(side, row, scale));
     if (!points.length) continue;
     roundedPath(ctx, points, tracked ? 8 : 5);
     drawRegion(ctx, colourOf(id), tracked);

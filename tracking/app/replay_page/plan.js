@@ -2,7 +2,7 @@
 
 const BODY = { shoulder: 0.24, depth: 0.13, head: 0.1, footprint: 0.25, track: 0.36 };
 const MANY = 80;
-const FOLLOWED = 2.2; // times that the plan is enlarged at the head of a report
+const FOLLOWED = 2; // times that the plan is enlarged at the head of a report
 const zoom = { times: 1, centre: [0, 0], scale: 1, width: 1, height: 1 }; // the plan's, and the size of a pane in px
 
 // Zooms so that the place under a pixel of a pane stays there.
@@ -80,13 +80,7 @@ function planPane(ctx, width, height, shown, frame, options) {
   if (options.trails) for (const side of people) drawTrails(plan, side, map);
   if (options.detections && found && found.plane !== "image") drawPlanDetections(plan);
   for (const side of people) drawPlanPeople(plan, side);
-  for (const [side, row] of rowsInError(shown, frame)) {
-    ctx.strokeStyle = theme.error;
-    ctx.lineWidth = 3;
-    ctx.beginPath();
-    ctx.arc(...positionOf(plan, side, row), Math.max(0.6 * scale, 11), 0, 2 * Math.PI);
-    ctx.stroke();
-  }
+  drawErrorsHere(plan, shown, Math.max(0.6 * scale, 11), (side, row) => [positionOf(plan, side, row)]);
   if (options.ids) drawPersonIds(plan, people.filter(side => side.rows(frame).length <= MANY));
   if (options.ids) for (const side of wholeGroups) drawWholeGroupIds(plan, side, map);
 }
