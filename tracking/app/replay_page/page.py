@@ -78,7 +78,7 @@ def page_html(title: str, data: str, film: str = "", still: str = "") -> str:
         "STYLE": theme() + (HERE / "page.css").read_text(encoding="utf-8"),
         "DATA": data,
         "FILM": film,
-        "STILL": still and f'<img src="{still}" alt="A frame of the replay"><p>{escape(title)}</p>',
+        "STILL": still and f'<img src="{still}" alt="A frame of the replay: {escape(title)}">',
         "SCRIPT": "\n".join((HERE / script).read_text(encoding="utf-8") for script in SCRIPTS),
     }
     pieces = (HERE / "page.html").read_text(encoding="utf-8").split("@@")
