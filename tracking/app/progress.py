@@ -76,7 +76,7 @@ class ProgressMeter:
         if not self.total or not self.done:
             return ""
         seconds = (time.monotonic() - self._began) * (self.total - self.done) / self.done
-        return f"({seconds // 60:.0f}:{seconds % 60:02.0f} left)"
+        return f"({int(seconds) // 60}:{int(seconds) % 60:02} left)" if seconds >= 1 else ""
 
     def _show(self) -> None:
         if not sys.stderr.isatty():
