@@ -16,9 +16,10 @@ from itertools import zip_longest
 from pathlib import Path
 
 import cv2
+import numpy as np
 
 from scenarios.errors import counted
-from sim.store.own_files import address, output_path
+from sim.store.own_files import output_path
 from sim.types import DetectionMode, Sequence
 from sim.workers.calls import RunItems
 from tracking.app.command_options import DemoOptions
@@ -113,20 +114,12 @@ def demo(options: DemoOptions) -> CommandResult:
     assert report.heat is not None
     columns, rows = report.heat.columns, report.heat.rows
     rows = {"all scenes": _cells(report.ranking, columns), **rows, PIXELS: _cells(pixels.ranking, columns)}
-    sides = [_best_and_worst(one, judged, trackers, report.by) for one, judged in zip(sequences, found, strict=False)]
-    write_report(
-        replace(
-            report, title=f"flockscope demo: {report.title}", about=ABOUT, heat=replace(report.heat, rows=rows),
-            curves=curves, moments=[*report.moments, *pixels.moments], opening=_opening(sequences[-1], *sides[-1], out),
-            sequences=[
-                (" · ".join([one.name, *(run.tracker for run in runs)]), f"pages/{address(_page(one))}", scores[-1])
-                for one, (runs, _, scores) in zip(sequences, sides, strict=True)
-            ],
-        ),
-        page,
+    ends = _best_and_worst(sequences[-1], found[-2], trackers, report.by)
+    shown = replace(
+        report, title=f"flockscope demo: {report.title}", about=ABOUT, heat=replace(report.heat, rows=rows),
+        curves=curves, moments=[*report.moments, *pixels.moments], opening=_opening(sequences[-1], *ends, out),
     )  # fmt: skip
-    for one, (runs, *_) in zip(sequences[:-1], sides, strict=False):
-        write_page(one, runs, out / "pages" / _page(one))
+    write_report(shown, page)
     every = [row for row in (*report.ranking, *pixels.ranking) if row["first"] is not None]
     cells = [[f"{r['run']}, from {r['input'].split()[0]}", *(number(k, r[k]) for k in COLUMNS)] for r in every]
     lines = [table("", ["tracker"], COLUMNS, cells)]
@@ -205,13 +198,9 @@ def _best_and_worst(
     return runs, key, [found[k] for k in ends]
 
 
-def _page(sequence: Sequence) -> Path:
-    return Path(f"{sequence.name}.html")
-
-
 def _opening(sequence: Sequence, runs: list[Run], key: str, scores: list[float], out: Path) -> Opening:
     """Writes the replay of a sequence with pictures, and returns it as the report's opening."""
-    page = out / "pages" / _page(sequence)
+    page = out / "replay.html"
     video = page_video(sequence, page, "inside")
     assert video is not None
     write_page(sequence, runs, page, video)
@@ -219,18 +208,18 @@ def _opening(sequence: Sequence, runs: list[Run], key: str, scores: list[float],
     dearest = dearest_error([error for error in runs[-1].errors if error.error.start > early])
     first = early + 1 if dearest is None else dearest.error.start
     data = page_data(sequence, runs, start=first - early)
-    picture = frame_pictures(sequence, [None, *(run.tracks for run in runs)], first + round(sequence.fps))
+    moment = min(first + round(sequence.fps), data["length"])
+    picture = frame_pictures(sequence, [None, *(run.tracks for run in runs)], moment)
     size = STILL_WIDTH, round(len(picture) * STILL_WIDTH / picture.shape[1])
+    still = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
     title = f"Truth, {', '.join(run.tracker for run in runs)}"
-    html = page_html(
-        title, script_json(data | {"video": video.facts(), "opening": True}), video.content,
-        data_address(cv2.resize(picture, size, interpolation=cv2.INTER_AREA)),
-    )  # fmt: skip
+    shown = script_json(data | {"video": video.facts(), "opening": True})
+    html = page_html(title, shown, video.content, data_address(still))
     words = (
         f"{' and '.join(f'{run.tracker} ({key} {score:.2f})' for run, score in zip(runs, scores, strict=True))} follow "
         "two groups that merge. Solid: the truth. Dashed: the tracker. Red: an error, named below."
     )
-    return Opening(words, html, f"pages/{address(_page(sequence))}")
+    return Opening(words, html, page.name)
 
 
 @contextmanager
@@ -262,8 +251,6 @@ def _compile(tracker: str) -> None:
 def _made_up_people() -> Sequence:
     """Returns pictures of people, and points of two people side by side and one apart, all that a tracker needs to call
     its kernels, with the types of simulated sequences."""
-    import numpy as np
-
     from sim.scene.camera import camera_rotation, px_per_m_at_centre
     from sim.types import Camera, Detections, Frame, Image
 
