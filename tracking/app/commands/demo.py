@@ -38,6 +38,7 @@ from tracking.app.tracker_setup import TrackerSetup
 from tracking.running import tracker_registry
 from tracking.stats import mean_of_finite
 
+REPLAY = "replay.html"
 SCENES = ("merge", "split", "cross", "queue")
 SEEDS = range(40_000, 40_002)
 QUICK_SCENES, QUICK_SEEDS = ("quick",), range(40_000, 40_001)
@@ -81,7 +82,8 @@ def demo(options: DemoOptions) -> CommandResult:
     start, out, quick = time.monotonic(), options.out, options.quick
     page = out / "index.html"
     check_packages()
-    refuse_foreign_file(page)
+    for file in (page, out / REPLAY):
+        refuse_foreign_file(file)
     trackers = list(QUICK_TRACKERS if quick else tracker_registry.names())
     of_pixels = [name for name in trackers if "pixels" in tracker_registry.find(name).needs][: 1 if quick else None]
     scenes, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
@@ -200,7 +202,7 @@ def _best_and_worst(
 
 def _opening(sequence: Sequence, runs: list[Run], key: str, scores: list[float], out: Path) -> Opening:
     """Writes the replay of a sequence with pictures, and returns it as the report's opening."""
-    page = out / "replay.html"
+    page = out / REPLAY
     video = page_video(sequence, page, "inside")
     assert video is not None
     write_page(sequence, runs, page, video)
