@@ -35,6 +35,7 @@ function follow() {
 function listenToZoom(canvas, show) {
   const inPane = event => [event.offsetX % zoom.width, event.offsetY % zoom.height];
   canvas.addEventListener("wheel", event => {
+    if (data.opening && !event.ctrlKey) return; // the report scrolls
     event.preventDefault();
     zoomBy(event.deltaY < 0 ? 1.25 : 0.8, ...inPane(event));
     show();
