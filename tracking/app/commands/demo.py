@@ -85,7 +85,7 @@ def demo(options: DemoOptions) -> CommandResult:
     for file in (page, out / REPLAY):
         refuse_foreign_file(file)
     trackers = list(QUICK_TRACKERS if quick else tracker_registry.names())
-    of_pixels = [name for name in trackers if "pixels" in tracker_registry.find(name).needs][: 1 if quick else None]
+    of_pixels = [name for name in trackers if "pixels" in tracker_registry.find(name).needs][: 1 if quick else 3]
     scenes, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
     settings = QUICK_PIXEL_SETTINGS if quick else PIXEL_SETTINGS
     with (
