@@ -37,7 +37,8 @@ class ProgressMeter:
     def __init__(self, what: str, total: int | None = None) -> None:
         self.what, self.total, self.done, self.item = what, total, 0, ""
         self._bar: Progress | None = None
-        self._last_line = time.monotonic() + PATIENCE - PAUSE
+        self._began = time.monotonic()
+        self._last_line = self._began + PATIENCE - PAUSE
         self._timer = threading.Timer(PATIENCE, self._show)
         self._lock = threading.Lock()
 
@@ -53,10 +54,10 @@ class ProgressMeter:
             if self._bar is not None:
                 self._bar.stop()
 
-    def step(self, item: str = "") -> None:
-        """Adds one finished item and shows the count. item: name to show, "" for none. Raises KeyboardInterrupt after
-        Ctrl-C."""
-        self.update(self.done + 1, self.total, item)
+    def step(self, item: str = "", count: int = 1) -> None:
+        """Adds `count` finished items and shows their number. item: name to show, "" for none. Raises KeyboardInterrupt
+        after Ctrl-C."""
+        self.update(self.done + count, self.total, item)
 
     def update(self, done: int, total: int | None, item: str = "") -> None:
         """Sets the number of finished items, `done`, and of all items, `total` (None if unknown), and shows them."""
@@ -64,10 +65,18 @@ class ProgressMeter:
         total = total if total is None or done <= total else None  # a budget can be exceeded
         self.done, self.total, self.item = done, total, printable(item)
         if self._bar is not None:
-            self._bar.update(self._bar.task_ids[0], completed=done, total=total, item=self.item)
+            self._bar.update(self._bar.task_ids[0], completed=done, total=total, item=self.item, left=self._left())
         elif not sys.stderr.isatty() and time.monotonic() - self._last_line > PAUSE:
             self._last_line = time.monotonic()
-            print(f"{self.what}: {done}{'' if total is None else f' of {total}'} {self.item}".rstrip(), file=sys.stderr)
+            words = [f"{self.what}: {done}{'' if total is None else f' of {total}'}", self.item, self._left()]
+            print(*filter(None, words), file=sys.stderr)
+
+    def _left(self) -> str:
+        """Returns in words how long the rest takes at the pace so far, "" if that is unknown."""
+        if not self.total or not self.done:
+            return ""
+        seconds = (time.monotonic() - self._began) * (self.total - self.done) / self.done
+        return f"({int(seconds) // 60}:{int(seconds) % 60:02} left)" if seconds >= 1 else ""
 
     def _show(self) -> None:
         if not sys.stderr.isatty():
@@ -78,11 +87,12 @@ class ProgressMeter:
         with self._lock:
             if self._timer.finished.is_set():
                 return
-            what, item = (TextColumn(text, markup=False) for text in ("{task.description}", "{task.fields[item]}"))
-            columns = (what, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), item)
+            texts = "{task.description}", "{task.fields[left]}", "{task.fields[item]}"
+            what, left, item = (TextColumn(text, markup=False) for text in texts)
+            columns = (what, BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(), left, item)
             bar = Progress(*columns, console=Console(stderr=True), transient=True)
             compiler = sys.modules.get("sim.compiler")  # not imported here, as it imports numba
             shown = "compiling, once" if compiler is not None and compiler.compiling.depth else self.item
-            bar.add_task(self.what, completed=self.done, total=self.total, item=shown)
+            bar.add_task(self.what, completed=self.done, total=self.total, item=shown, left=self._left())
             bar.start()
             self._bar = bar

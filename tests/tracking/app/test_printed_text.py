@@ -114,3 +114,12 @@ def test_any_terminal_and_locale(env):
     assert refused.returncode == 2
     assert refused.stderr.count("\n") == 1
     assert "\x1b" not in refused.stderr
+
+
+def test_progress_tells_how_long_the_rest_takes(capsys, monkeypatch):
+    monkeypatch.setattr(progress, "PAUSE", -1.0)
+    with ProgressMeter("demo", 8) as meter:
+        meter._last_line = 0.0
+        meter._began -= 90.25
+        meter.step("blob", 6)
+    assert capsys.readouterr().err == "demo: 6 of 8 blob (0:30 left)\n"

@@ -1,47 +1,66 @@
-"""`flockscope demo`: generates scenes, tracks them, scores the tracks and writes pages to open.
+"""`flockscope demo`: generates scenes, tracks them, scores the tracks and writes a page to open.
 
-The first page has videos of one scene, and tables of scores that link to replays.
+The page opens with a replay of the best and the worst tracker on a scene with pictures; the report on all runs follows.
 """
 
 from __future__ import annotations
 
+import math
 import os
-import re
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Sequence as SequenceOf
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
-from html import escape
+from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
 
+import cv2
+import numpy as np
+
 from scenarios.errors import counted
-from sim.store.own_files import GENERATOR, address, output_path
+from sim.store.own_files import output_path
 from sim.types import DetectionMode, Sequence
+from sim.workers.calls import RunItems
 from tracking.app.command_options import DemoOptions
 from tracking.app.command_result import CommandResult
+from tracking.app.pictures.contact_sheet import frame_pictures
 from tracking.app.progress import ProgressMeter
-from tracking.app.score_ranking import COLUMNS, interval, rank_words, shown_columns, usual_key, verdict
-from tracking.app.score_tables import SIMILARITY, number, table
+from tracking.app.replay_page.page import Run, page_data, page_html, script_json, write_page
+from tracking.app.replay_page.video import page_video
+from tracking.app.report.content import Curves, HeatCell, Json, Opening
+from tracking.app.report.moments import data_address, dearest_error
+from tracking.app.report.of_runs import JudgedRuns, judge, report_of_runs
+from tracking.app.score_ranking import COLUMNS
+from tracking.app.score_tables import number, table
+from tracking.app.scored_sequence import read_runs, scoring_jobs
 from tracking.app.tracker_setup import TrackerSetup
-from tracking.comparison import ComparedRuns, compare
 from tracking.running import tracker_registry
-from tracking.running.run import TrackingRun
-from tracking.scoring.catalogue import CATALOGUE
+from tracking.stats import mean_of_finite
 
+REPLAY = "replay.html"
 SCENES = ("merge", "split", "cross", "queue")
 SEEDS = range(40_000, 40_002)
 QUICK_SCENES, QUICK_SEEDS = ("quick",), range(40_000, 40_001)
 QUICK_TRACKERS = ("blob", "group-pda")  # one that reports people, one that reports groups
-PIXEL_SCENE, PIXEL_SEED = "split", range(40_000, 40_001)  # The scene that is rendered and tracked from its pictures.
+SWEEP_VALUES, SWEEP_SETTINGS = 4, ("camera.fps=5", "duration=12")
 
-PIXEL_SETTINGS = ("duration=12",)  # The group has split by then.
-QUICK_PIXEL_SETTINGS = ("camera.fps=5", "camera.image=[480,360]")
+# The scene that is drawn, and tracked from its pictures, too: light ground, varied clothes, people who come near.
+PIXEL_SCENE, PIXEL_SEED = "merge", range(40_017, 40_018)
+NEAR = ("duration=10", "camera.tilt_deg=18", "picture.texture=0.3", "sensor.detect_prob=0.8")
+PIXEL_SETTINGS = (*NEAR, "camera.image=[640,360]")
+QUICK_PIXEL_SETTINGS = (*NEAR, "camera.image=[480,270]", "camera.fps=5")
+PIXELS = f"{PIXEL_SCENE} from pixels"
 
-VIDEO = """<figure><video src="{video}#t={start:.1f}" controls muted loop playsinline preload="metadata"></video>
-<figcaption><a href="{page}"><code>{tracker}</code></a></figcaption></figure>"""
+DRAWING, TRACKING = 6, 4  # times as long as another step
+BEFORE = 2.5  # s from the start of the replay to the dearest error
+STILL_WIDTH = 1200  # px
 
-Runs = Mapping[str, list[TrackingRun]]  # By tracker, the run of each sequence.
+ABOUT = (
+    "Scenes in which groups merge, split, cross and queue were simulated, tracked and scored. Trackers that share a "
+    "rank have no sure difference. The oracle has true ids on the same input; it fills no gaps, so trackers that do "
+    "may score more. A dash: nothing to score, as people of a tracker that reports groups."
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,96 +69,159 @@ class _TrackJob:
     detections: DetectionMode
     folders: list[Path]  # of sequences
     out: Path  # a run is written into the folder of this that has its sequence's name
-    overlay: Path | None = None  # where to draw tracks over the last sequence's pictures
 
 
 def demo(options: DemoOptions) -> CommandResult:
     """Writes simulated scenes, tracks and pages into the folder --out; scenes that are already there are kept."""
     from sim.dataset.generate import generate
-    from sim.store.atomic import write_file
     from sim.store.own_files import refuse_foreign_file
-    from tracking.app.replay_page.page import theme
+    from sim.workers.start import results_in_order, start_workers
+    from tracking.app.report.page import check_packages, write_report
     from tracking.recordings.source import open_source
 
     start, out, quick = time.monotonic(), options.out, options.quick
     page = out / "index.html"
-    refuse_foreign_file(page)
-    names, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
+    check_packages()
+    for file in (page, out / REPLAY):
+        refuse_foreign_file(file)
+    trackers = list(QUICK_TRACKERS if quick else tracker_registry.names())
+    of_pixels = [name for name in trackers if "pixels" in tracker_registry.find(name).needs][: 1 if quick else 3]
+    scenes, seeds = (QUICK_SCENES, QUICK_SEEDS) if quick else (SCENES, SEEDS)
     settings = QUICK_PIXEL_SETTINGS if quick else PIXEL_SETTINGS
-    with _compiled_ahead() as compiled:
-        with ProgressMeter("generate") as meter:
-            folders = generate(names, seeds, out / "data", progress=meter.update, streams=())
-            (rendered,) = generate(
-                [PIXEL_SCENE], PIXEL_SEED, out / "pictures", set=settings, streams=("left",), images="mp4"
-            )  # fmt: skip
-        trackers = QUICK_TRACKERS if quick else tracker_registry.names()
-        jobs = _jobs(out, trackers, folders, rendered, quick)
-        runs = _runs(compiled(jobs), len(jobs), 1 if quick else os.cpu_count() or 1)
-    sequences, scenes = [open_source(folder)[0] for folder in folders], open_source(rendered)
-    given: dict[str, dict[str, list[TrackingRun]]] = {"points": {}, "boxes": {}, "pixels": {}}
-    for job in sorted(runs, key=lambda job: trackers.index(job.tracker)):
-        of_boxes = "points" not in tracker_registry.find(job.tracker).needs
-        given["pixels" if job.overlay else "boxes" if of_boxes else "points"][job.tracker] = runs[job]
-    parts, cells = list[str](), list[list[str]]()
-    for word, found in given.items():
-        of = scenes if word == "pixels" else sequences
-        compared = compare(of, found)
-        key = usual_key(compared)
-        pages = _replays(of, found, out / "pages" / word)
-        parts += [f"<h2>Trackers from {word}</h2>", _ranking(compared, key), _scenes(compared, key, pages, out)]
-        rows = (row for row in compared.to_arrow(key).to_pylist() if row["first"] is not None)
-        cells += [[f"{row['run']}, from {word}", *(number(k, row[k]) for k in COLUMNS)] for row in rows]
-    frames = scenes[0].length or 0
-    films = "".join(
-        VIDEO.format(
-            video=escape(f"pages/pixels/{name}.mp4"), start=0.4 * frames / scenes[0].fps, tracker=name,
-            page=address(page.relative_to(out)),
-        ) for name, (page,) in pages.items()
+    with (
+        _compiled_ahead() as compiled, start_workers(1 if quick else os.cpu_count() or 1) as run,
+        ProgressMeter("demo") as meter,
+    ):  # fmt: skip
+        count = len(SCENES) * len(seeds)
+        meter.total = count * 2 + DRAWING + 2 + TRACKING * (len(trackers) + len(of_pixels))
+        meter.total += SWEEP_VALUES * len(SEEDS) * len(trackers)
+        folders = generate(scenes, seeds, out / "data", progress=lambda *_: meter.step("simulate"), streams=())
+        folders += generate(
+            [PIXEL_SCENE], PIXEL_SEED, out / "pictures", set=settings, streams=("left",), images="mp4"
+        )  # fmt: skip
+        meter.step("draw", DRAWING)
+        for job, _ in run(_tracked, compiled(_jobs(out, trackers, of_pixels, folders))):
+            meter.step(f"track {job.tracker}", TRACKING)
+        tasks = [(folder, [out / "tracks" / name for name in trackers]) for folder in folders]
+        tasks.append((folders[-1], [out / "tracks" / f"{name}-image" for name in of_pixels]))
+        found = list[JudgedRuns]()
+        for judged in results_in_order(run, _judged, tasks):
+            found.append(judged)
+            meter.step("score")
+        sequences = [open_source(folder)[0] for folder in folders]
+        report = report_of_runs(trackers, sequences, found[:-1], None, {})
+        curves = _curves(trackers, report.by, run, out, meter.step)
+    seen = replace(sequences[-1], name=f"{PIXELS}-s{PIXEL_SEED[0]}")
+    pixels = report_of_runs(of_pixels, [seen], found[-1:], report.by, {})
+    assert report.heat is not None
+    columns, rows = report.heat.columns, report.heat.rows
+    rows = {"all scenes": _cells(report.ranking, columns), **rows, PIXELS: _cells(pixels.ranking, columns)}
+    ends = _best_and_worst(sequences[-1], found[-2], trackers, report.by)
+    shown = replace(
+        report, title=f"flockscope demo: {report.title}", about=ABOUT, heat=replace(report.heat, rows=rows),
+        curves=curves, moments=[*report.moments, *pixels.moments], opening=_opening(sequences[-1], *ends, out),
     )  # fmt: skip
-    text = Path(__file__).with_name("demo_page.html").read_text(encoding="utf-8")
-    words = {"GENERATOR": GENERATOR, "STYLE": theme(), "FRAMES": str(frames), "PARTS": "\n".join(parts), "FILMS": films}
-    words["MEANINGS"] = "".join(f"<dt>{k}</dt><dd>{escape(CATALOGUE[k].meaning)}</dd>" for k in ("objective", *COLUMNS))
-    write_file(page, re.sub("@@([A-Z]+)@@", lambda found: words[found[1]], text).encode())
+    write_report(shown, page)
+    every = [row for row in (*report.ranking, *pixels.ranking) if row["first"] is not None]
+    cells = [[f"{r['run']}, from {r['input'].split()[0]}", *(number(k, r[k]) for k in COLUMNS)] for r in every]
     lines = [table("", ["tracker"], COLUMNS, cells)]
-    lines += [f"{counted(len(sequences), 'sequence')} in {folders[0].parent}; one with pictures, {rendered}"]
+    lines += [f"{counted(len(sequences), 'sequence')} in {folders[0].parent} and, with pictures, {folders[-1]}"]
     lines += [f"{time.monotonic() - start:.0f} s; open this page:", str(page.resolve())]
     return CommandResult({"sequences": len(sequences), "page": page}, "\n".join(lines))
 
 
-def _jobs(out: Path, trackers: Iterable[str], folders: list[Path], rendered: Path, quick: bool) -> list[_TrackJob]:
-    names, pictures, tracks = [*trackers], out / "pages" / "pixels", out / "tracks"
-    of_pixels = names[:1] if quick else [name for name in names if "pixels" in tracker_registry.find(name).needs]
-    image_jobs = [
-        _TrackJob(name, "image", [rendered], tracks / f"{name}-image", pictures / f"{name}.mp4") for name in of_pixels
-    ]
-    file_jobs = [_TrackJob(name, "file", folders, tracks / name) for name in reversed(names)]
+def _jobs(out: Path, trackers: SequenceOf[str], of_pixels: Iterable[str], folders: list[Path]) -> list[_TrackJob]:
+    tracks = out / "tracks"
+    image_jobs = [_TrackJob(name, "image", folders[-1:], tracks / f"{name}-image") for name in of_pixels]
+    file_jobs = [_TrackJob(name, "file", folders, tracks / name) for name in reversed(trackers)]
     # Neighbours are of different trackers: two that run at once need not compile the same.
     return [job for two in zip_longest(image_jobs, file_jobs) for job in two if job is not None]
 
 
-def _runs(jobs: Iterable[_TrackJob], count: int, workers: int) -> dict[_TrackJob, list[TrackingRun]]:
-    from sim.workers.start import start_workers
-
-    runs = {}
-    with ProgressMeter("track", count) as meter, start_workers(workers) as run:
-        for job, found in run(_tracked, jobs):
-            runs[job] = found
-            meter.step(f"{job.tracker}{' from pixels' if job.overlay else ''}")
-    return runs
-
-
-def _tracked(job: _TrackJob) -> list[TrackingRun]:
-    from tracking.app.pictures.overlay import write_overlay
+def _tracked(job: _TrackJob) -> None:
     from tracking.recordings.source import open_source
 
-    runs = []
     for folder in job.folders:
         (sequence,) = open_source(folder)
-        runs.append(TrackerSetup(job.tracker, detections=job.detections).run(sequence))
-        runs[-1].write(output_path(job.out, sequence.name), sequence)
-    if job.overlay is not None:
-        write_overlay(sequence, runs[-1], job.overlay, "over")
-    return runs
+        run = TrackerSetup(job.tracker, detections=job.detections).run(sequence)
+        run.write(output_path(job.out, sequence.name), sequence)
+
+
+def _judged(task: tuple[Path, list[Path]]) -> JudgedRuns:
+    """Returns the scores and errors on the sequence in a folder of the runs in other folders."""
+    from tracking.recordings.source import open_source
+
+    folder, runs = task
+    (sequence,) = open_source(folder)
+    (job,) = scoring_jobs(map(str, runs), [sequence], oracles=True)
+    return judge(sequence, job)
+
+
+def _curves(trackers: Iterable[str], by: str, run: RunItems, out: Path, step: Callable[[str], None]) -> Curves:
+    """Plays the trackers with fewer and fewer detections and returns their mean scores."""
+    from sim.workers.start import results_in_order
+    from tracking.stress.axes import parse_axis
+    from tracking.stress.scene_player import Store, contender, play_scene
+    from tracking.stress.sweep import Plan, Sweep
+
+    axis, unknown = parse_axis("detection"), [None] * SWEEP_VALUES
+    plan = Plan((PIXEL_SCENE,), (axis,), tuple(SEEDS), len(SEEDS), by, 0.8, "file", SWEEP_SETTINGS)
+    sweep = Sweep(
+        plan, {name: contender(name) for name in trackers}, lambda scenes: results_in_order(run, play_scene, scenes),
+        Store(out / "episodes.jsonl", fresh=True), step,
+    )  # fmt: skip
+    sweep.values, sweep.seeds = [(value,) for value in axis.spread(SWEEP_VALUES)], len(SEEDS)
+    sweep.play_values()
+    means = {name: [mean_of_finite(at) for at in sweep.scores(name).T] for name in (*trackers, sweep.oracle_names[0])}
+    curves = {name: {"mean": mean, "low": unknown, "high": unknown, "break": None} for name, mean in means.items()}
+    words = [f"Mean of {counted(len(SEEDS), 'scene')} of {PIXEL_SCENE}; so few give no interval."]
+    return Curves(axis.name, axis.about, [value for (value,) in sweep.values], curves, {}, words)
+
+
+def _cells(ranking: SequenceOf[Json], columns: Iterable[str]) -> list[HeatCell]:
+    """Returns a row of the heat map, with the mean scores of a ranking."""
+    best = {row["input"]: row["mean"] for row in ranking if row["first"] is None}
+    cells = {row["run"]: HeatCell(row["mean"], best.get(row["input"], math.nan)) for row in ranking}
+    return [cells.get(name, HeatCell(math.nan, math.nan, "not run")) for name in columns]
+
+
+def _best_and_worst(
+    sequence: Sequence, judged: JudgedRuns, trackers: SequenceOf[str], by: str
+) -> tuple[list[Run], str, list[float]]:
+    """Returns the runs with the highest and the lowest score on a sequence, the key of the score, and their scores. The
+    score is HOTA if two or more runs have it, else `by`."""
+    for key in ("HOTA", by):
+        found = {k: s[key] for k, s in enumerate(judged.scored.scores) if math.isfinite(s[key])}
+        if len(found) > 1:
+            break
+    ends = dict.fromkeys([max(found, key=found.__getitem__), min(found, key=found.__getitem__)])
+    tracks = read_runs(sequence, replace(judged.job, sources=tuple(judged.job.sources[k] for k in ends)))
+    runs = [Run(tracked, judged.errors[k].errors, trackers[k]) for k, tracked in zip(ends, tracks, strict=True)]
+    return runs, key, [found[k] for k in ends]
+
+
+def _opening(sequence: Sequence, runs: list[Run], key: str, scores: list[float], out: Path) -> Opening:
+    """Writes the replay of a sequence with pictures, and returns it as the report's opening."""
+    page = out / REPLAY
+    video = page_video(sequence, page, "inside")
+    assert video is not None
+    write_page(sequence, runs, page, video)
+    early = round(BEFORE * sequence.fps)
+    dearest = dearest_error([error for error in runs[-1].errors if error.error.start > early])
+    first = early + 1 if dearest is None else dearest.error.start
+    data = page_data(sequence, runs, start=first - early)
+    moment = min(first + round(sequence.fps), data["length"])
+    picture = frame_pictures(sequence, [None, *(run.tracks for run in runs)], moment)
+    size = STILL_WIDTH, round(len(picture) * STILL_WIDTH / picture.shape[1])
+    still = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
+    title = f"Truth, {', '.join(run.tracker for run in runs)}"
+    shown = script_json(data | {"video": video.facts(), "opening": True})
+    html = page_html(title, shown, video.content, data_address(still))
+    words = (
+        f"{' and '.join(f'{run.tracker} ({key} {score:.2f})' for run, score in zip(runs, scores, strict=True))} follow "
+        "two groups that merge. Solid: the truth. Dashed: the tracker. Red: an error, named below."
+    )
+    return Opening(words, html, page.name)
 
 
 @contextmanager
@@ -171,8 +253,6 @@ def _compile(tracker: str) -> None:
 def _made_up_people() -> Sequence:
     """Returns pictures of people, and points of two people side by side and one apart, all that a tracker needs to call
     its kernels, with the types of simulated sequences."""
-    import numpy as np
-
     from sim.scene.camera import camera_rotation, px_per_m_at_centre
     from sim.types import Camera, Detections, Frame, Image
 
@@ -199,46 +279,3 @@ def _made_up_people() -> Sequence:
         "made-up", fps, 16, frames, image_size=camera.image, camera=camera, has_images=True, has_detections=True,
         px_per_m=px_per_m_at_centre(camera), load_background=lambda: np.stack([picture() for _ in range(12)]),
     )  # fmt: skip
-
-
-def _replays(sequences: list[Sequence], runs: Runs, folder: Path) -> dict[str, list[Path]]:
-    """Writes a replay page for each run; pages of one sequence share the video beside them."""
-    from tracking.app.replay_page.page import Run, write_page
-    from tracking.app.replay_page.video import page_video
-
-    videos = [page_video(one, output_path(folder, one.name, ".html"), "beside") for one in sequences]
-    pages = {}
-    for name, found in runs.items():
-        each = zip(sequences, found, videos, strict=True)
-        pages[name] = [write_page(one, [Run(run)], folder / f"{name}-{one.name}.html", film) for one, run, film in each]
-    return pages
-
-
-def _ranking(compared: ComparedRuns, key: str) -> str:
-    entries = compared.to_arrow(key).to_pylist()
-    keys = shown_columns(entries, key)
-    rows = []
-    for e in entries:
-        name, mean = escape(e["run"]), f"{number(key, e['mean'], mean=True)}<br><small>{interval(key, e)}</small>"
-        rows.append([name if e["first"] else f"<em>{name}</em>", rank_words(e), mean])
-        rows[-1] += [number(k, e[k], mean=True) for k in keys]
-    words = "; ".join(verdict(compared, key))
-    sure = f"<p><strong>Result:</strong> {escape(words)}.</p>" if words else ""
-    by = f"people compared by {SIMILARITY[compared.similarity]}; small: 95 % interval"
-    note = f"<p>{counted(len(compared.sequences), 'scene')}, {by}.</p>"
-    return note + sure + _table(["<th>tracker</th>", "<th>rank</th>", *(f"<th>{k}</th>" for k in (key, *keys))], rows)
-
-
-def _scenes(compared: ComparedRuns, key: str, pages: Mapping[str, list[Path]], root: Path) -> str:
-    """Returns a table of the scores of all runs, which link to their replays."""
-    rows = [[escape(name)] for name in compared.sequences]
-    for name, own in pages.items():
-        for row, page, scores in zip(rows, own, compared.scores[name], strict=True):
-            row.append(f'<a href="{address(page.relative_to(root))}">{number(key, scores[key])}</a>')
-    head = ["<th>sequence</th>", *(f"<th>{escape(name)}</th>" for name in pages)]
-    return f"<details><summary>Replays, by {key}</summary>{_table(head, rows)}</details>"
-
-
-def _table(head: list[str], rows: list[list[str]]) -> str:
-    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
-    return f'<div class="wide"><table><thead><tr>{"".join(head)}</tr></thead><tbody>{body}</tbody></table></div>'

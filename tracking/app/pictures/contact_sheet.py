@@ -82,6 +82,19 @@ def write_sheet(sequence: Sequence, out: str | Path, frames: int = 8, tracks: Se
     return path
 
 
+def frame_pictures(sequence: Sequence, runs: SequenceOf[SequenceOf[Tracks] | None], index: int) -> Image:
+    """Returns frame `index` (from 1) as picture and plan, beside each other for each run; for None with the truth."""
+    columns = []
+    for tracks in runs:
+        parts = views(sequence, _layers(sequence, tracks), [index])
+        areas = [np.empty((part.height(), WIDTH, 3), np.uint8) for part in parts]
+        for part, area in zip(parts, areas, strict=True):
+            part.draw(area, index, sequence.fps)
+        columns.append(np.concatenate(areas))
+    height = min(map(len, columns))
+    return np.concatenate([column[:height] for column in columns], axis=1)
+
+
 def _layers(sequence: Sequence, tracks: SequenceOf[Tracks] | None) -> list[Layer]:
     """Returns what is drawn over pictures, and on a plan if places on the ground are known."""
     truth = sequence.truth

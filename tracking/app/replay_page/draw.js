@@ -1,6 +1,7 @@
 // Colours, shapes, labels and trails that plan, image and whole groups share.
 
 const TRAIL_SECONDS = 3;
+const NARROW = 560; // px: panes of a narrower canvas stand one above the other
 const darkQuery = matchMedia("(prefers-color-scheme: dark)");
 // Colour-blind readers can tell them apart; their contrast to the background is 3 : 1 or more.
 const COLOURS = {
@@ -8,8 +9,8 @@ const COLOURS = {
   dark: ["#56b4e9", "#f0963c", "#2fc79a", "#e58fc0", "#b3a1f0", "#e0c341", "#ff7b72", "#7fd4e8", "#a3d15c", "#d6a07a"],
 };
 const THEMES = {
-  light: { ground: "#fbfcfd", grid: "#e6eaee", wall: "#2d333b", thing: "#656d76", floor: "#eef1f4", ink: "#1b1f24", halo: "#ffffff", alone: "#656d76", found: "#1b1f24" },
-  dark: { ground: "#12171d", grid: "#232b34", wall: "#c5ccd4", thing: "#8b949e", floor: "#1d242c", ink: "#e8ecf1", halo: "#0f1318", alone: "#8b949e", found: "#e8ecf1" },
+  light: { ground: "#fbfcfd", grid: "#e6eaee", wall: "#2d333b", thing: "#656d76", floor: "#eef1f4", ink: "#1b1f24", halo: "#ffffff", alone: "#656d76", found: "#1b1f24", error: "#d1242f" },
+  dark: { ground: "#12171d", grid: "#232b34", wall: "#c5ccd4", thing: "#8b949e", floor: "#1d242c", ink: "#e8ecf1", halo: "#0f1318", alone: "#8b949e", found: "#e8ecf1", error: "#ff6b5e" },
 };
 let theme = THEMES.light, palette = COLOURS.light;
 
@@ -177,6 +178,35 @@ function paneTitle(parts, shown) {
   return other ? shown[shown.length - 1].word : shown[0].name;
 }
 
+// Divides a canvas into panes: side by side, on a narrow page one above the other. aspect: of a pane. draw is called for
+// each pane with its number and size.
+function drawPanes(canvas, count, aspect, draw) {
+  const down = count > 1 && canvas.clientWidth < NARROW, across = down ? 1 : count;
+  const [ctx, width, height] = prepareCanvas(canvas, aspect * (down ? count : 1 / count));
+  const w = width / across, h = height / (down ? count : 1);
+  for (let k = 0; k < count; k++) draw(k, ctx, down ? 0 : k * w, down ? k * h : 0, w, h);
+}
+
+// The latest errors of a side that are shown at a frame, each at least for a second; at most two.
+function errorsAt(side, frame) {
+  return data.errors
+    .filter(error => error.side === side.name && error.start <= frame && frame <= Math.max(error.end, error.start + data.fps))
+    .sort((a, b) => b.start - a.start).slice(0, 2);
+}
+
+// Draws a line round the people, or the ghost, of each error of the shown tracks. reach: the points in px of [side, row]
+// that the line goes round, at a distance of r px.
+function drawErrorsHere({ ctx, frame }, shown, r, reach) {
+  ctx.strokeStyle = theme.error;
+  ctx.lineWidth = 3;
+  for (const run of shown.filter(side => side.tracked)) for (const { people, after } of errorsAt(run, frame)) {
+    const side = people.length ? shown.find(one => !one.tracked) : run, ids = people.length ? people : [after];
+    const points = side ? [...side.rows(frame)].filter(row => ids.includes(side.id[row])).flatMap(row => reach(side, row)) : [];
+    roundedPath(ctx, points.filter(p => !Number.isNaN(p[0])), r);
+    ctx.stroke();
+  }
+}
+
 function inPane(ctx, x, y, width, height, title, draw) {
   ctx.save();
   ctx.beginPath();
@@ -185,7 +215,8 @@ function inPane(ctx, x, y, width, height, title, draw) {
   ctx.translate(x, y);
   draw();
   if (title) {
-    label(ctx, title, width / 2, 17, theme.ink, true);
+    ctx.font = font(true);
+    label(ctx, title, 10 + ctx.measureText(title).width / 2, 19, theme.ink, true);
     ctx.fillStyle = theme.thing;
     ctx.fillRect(x ? 0 : width - 1, 0, 1, height);
   }

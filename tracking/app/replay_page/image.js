@@ -3,13 +3,10 @@
 function drawImage(canvas, frame, options) {
   const [imageWidth, imageHeight] = data.image;
   const parts = splitPanes(sides.filter(side => options[side.name]), options.beside);
-  const [ctx, width, height] = prepareCanvas(canvas, imageHeight / imageWidth / parts.length);
-  const w = width / parts.length, scale = w / imageWidth;
-  parts.forEach((shown, k) => {
-    const title = paneTitle(parts, shown);
-    inPane(ctx, k * w, 0, w, height, title, () => {
-      const overPicture = options.video && (player ? player.draw(ctx, w, height) : drawBackground(ctx, w, height));
-      imagePane({ ctx, width: w, height, scale, frame, options, overPicture, taken: [] }, shown);
+  drawPanes(canvas, parts.length, imageHeight / imageWidth, (k, ctx, x, y, w, h) => {
+    inPane(ctx, x, y, w, h, paneTitle(parts, parts[k]), () => {
+      const overPicture = options.video && (player ? player.draw(ctx, w, h) : drawBackground(ctx, w, h));
+      imagePane({ ctx, width: w, height: h, scale: w / imageWidth, frame, options, overPicture, taken: [] }, parts[k]);
     });
   });
 }
@@ -29,8 +26,22 @@ function imagePane(pane, shown) {
   if (pane.options.hulls) for (const side of people) drawImageHulls(pane, side);
   for (const [side, map] of wholeGroups) drawWholeGroups(pane, side, map);
   if (pane.options.detections && found) drawImageDetections(pane);
-  for (const side of people) drawImageBoxes(pane, side);
+  for (const side of people) if (side.tracked || !data.opening) drawImageBoxes(pane, side);
   if (pane.options.ids) for (const [side, map] of wholeGroups) drawWholeGroupIds(pane, side, map);
+  drawErrorsHere(pane, shown, 7, (side, row) => cornersOf(side, row, pane.scale));
+}
+
+// The corners, in px, of a box, or of a ring round the feet of somebody without one.
+function cornersOf(side, row, scale) {
+  const box = boxOf(side, row, scale);
+  return box ? [[0, 0], [1, 0], [0, 1], [1, 1]].map(([p, q]) => [box[0] + p * box[2], box[1] + q * box[3]]) : footRing(side, row, scale);
+}
+
+// The points, in px, of a ring on the ground round a person's feet; [] where the camera cannot see it.
+function footRing(side, row, scale) {
+  const turns = Array.from({ length: 25 }, (_, k) => (k * Math.PI) / 12), map = toImage(side, scale);
+  const reach = side.plane === "image" ? 0 : BODY.track;
+  return map ? mapAll(turns.map(t => [side.x[row] + reach * Math.cos(t), side.y[row] + reach * Math.sin(t)]), map) : [];
 }
 
 // A function from x, y in a side's plane to px of the pane, or to null for a point that the camera cannot see.
@@ -76,6 +87,17 @@ function drawImageBoxes({ ctx, scale, frame, options, overPicture, taken }, side
       ctx.arc(side.x[row] * scale, side.y[row] * scale, 6, 0, 2 * Math.PI);
       ctx.stroke();
       if (ids) label(ctx, side.id[row], side.x[row] * scale, side.y[row] * scale - 9, colour);
+    } else {
+      const ring = footRing(side, row, scale);
+      ctx.setLineDash([]);
+      ctx.lineWidth = 3;
+      for (const look of [theme.halo, colour]) {
+        ctx.strokeStyle = look;
+        strokeLine(ctx, ring);
+        ctx.lineWidth = 2;
+      }
+      const spots = ([p, q]) => [[0, 1], [1, 0], [-1, 0]].map(([a, b]) => [ring[6][0] + a * (p + 10), ring[18][1] + b * (q + 3)]);
+      if (ids && ring.length) placeLabel(ctx, taken, side.id[row], spots, colour, tracked);
     }
   }
   ctx.setLineDash([]);
@@ -93,12 +115,7 @@ function strokeBoxRim(ctx, box, colour) {
 function drawImageHulls({ ctx, scale, frame, options, taken }, side) {
   const { tracked } = side;
   for (const [id, rows] of groupsAt(side, frame)) {
-    const points = [];
-    for (const row of rows) {
-      const box = boxOf(side, row, scale);
-      if (box) for (const [p, q] of [[0, 0], [1, 0], [0, 1], [1, 1]]) points.push([box[0] + p * box[2], box[1] + q * box[3]]);
-      else if (side.plane === "image") points.push([side.x[row] * scale, side.y[row] * scale]);
-    }
+    const points = rows.flatMap(row => cornersOf(side, row, scale));
     if (!points.length) continue;
     roundedPath(ctx, points, tracked ? 8 : 5);
     drawRegion(ctx, colourOf(id), tracked);

@@ -31,11 +31,13 @@ function seekTo(frame) {
 function show() {
   const frame = state.frame;
   $("stages").classList.toggle("beside", options.beside && sides.filter(side => options[side.name]).length > 1);
+  if (data.opening) follow();
   if (hasPlan) drawPlan($("plan"), frame, options);
   showImage();
   if (line) line.move(frame);
   $("seek").value = frame;
   $("seek").setAttribute("aria-valuetext", `frame ${frame}, ${seconds(frame).toFixed(1)} seconds`);
+  showErrors(frame);
   $("clock").value = `${frame} / ${data.length} · ${seconds(frame).toFixed(2)} s`;
   showFacts(frame);
 }
@@ -59,10 +61,14 @@ function onVideoChange() {
     if (state.playing) play(true);
     return show();
   }
+  if (data.opening && !state.begun && player.frame) {
+    state.begun = true;
+    if (!matchMedia("(prefers-reduced-motion: reduce)").matches) play(true);
+  }
   if (!state.playing || !player.canPlay) return showImage();
   state.frame = player.frame;
   show();
-  if (state.frame >= data.to) play(false);
+  if (state.frame >= data.to) end();
 }
 
 function showFacts(frame) {
@@ -85,6 +91,26 @@ function showFacts(frame) {
     const error = data.errors[k];
     button.setAttribute("aria-current", error.start <= frame && frame <= error.end);
   });
+}
+
+// For each tracker the errors at a frame in words, at most two.
+function showErrors(frame) {
+  const shown = data.errors.length ? sides.filter(side => side.tracked && options[side.name]) : [];
+  const words = shown.map(side => errorsAt(side, frame).slice(0, 2));
+  const key = JSON.stringify([shown.map(side => side.name), words.map(found => found.map(error => data.errors.indexOf(error)))]);
+  if ($("now").dataset.key === key) return;
+  $("now").dataset.key = key;
+  $("now").replaceChildren(...shown.map((side, k) => {
+    const box = tag("div", ""), lines = words[k].map(error => {
+      const line = tag("p", ""), kind = tag("span", error.kind);
+      kind.className = "kind";
+      line.append(kind, `: ${error.who}; cause: ${error.detail || (error.cause === "tracker" ? "the tracker alone" : error.cause)}`);
+      return line;
+    });
+    box.classList.toggle("wrong", lines.length > 0);
+    box.append(tag("strong", side.word), ...(lines.length ? lines : [tag("p", "no error at this moment")]));
+    return box;
+  }));
 }
 
 function tag(name, text) {
@@ -115,8 +141,14 @@ function tick(now) {
   state.then = now;
   const frame = Math.floor(state.clock);
   if (frame !== state.frame) seekTo(frame);
-  if (state.frame >= data.to) play(false);
+  if (state.frame >= data.to) end();
   else requestAnimationFrame(tick);
+}
+
+// The replay at the head of a report starts again.
+function end() {
+  play(false);
+  if (data.opening) play(true);
 }
 
 function step(count) {
@@ -286,6 +318,8 @@ function seekToAddress() {
   if (frame >= 1) jump(frame);
 }
 
+document.body.classList.toggle("opening", Boolean(data.opening));
+if (data.opening) zoom.times = FOLLOWED;
 if (player) $("under").append(player.video);
 buildHead();
 buildControls();

@@ -68,13 +68,17 @@ def write_page(
     return path
 
 
-def page_html(title: str, data: str, film: str = "") -> str:
-    """Returns the page as HTML. data: from `script_json`, what the page shows; film: the video in base64, or ""."""
+def page_html(title: str, data: str, film: str = "", still: str = "") -> str:
+    """Returns the page as HTML. data: from `script_json`, what the page shows; film: the video in base64, or "".
+
+    still: address of a picture for browsers without JavaScript, or "".
+    """
     parts = {
         "TITLE": escape(title),
         "STYLE": theme() + (HERE / "page.css").read_text(encoding="utf-8"),
         "DATA": data,
         "FILM": film,
+        "STILL": still and f'<img src="{still}" alt="A frame of the replay: {escape(title)}">',
         "SCRIPT": "\n".join((HERE / script).read_text(encoding="utf-8") for script in SCRIPTS),
     }
     pieces = (HERE / "page.html").read_text(encoding="utf-8").split("@@")

@@ -2,6 +2,7 @@
 
 const BODY = { shoulder: 0.24, depth: 0.13, head: 0.1, footprint: 0.25, track: 0.36 };
 const MANY = 80;
+const FOLLOWED = 2; // times that the plan is enlarged at the head of a report
 const zoom = { times: 1, centre: [0, 0], scale: 1, width: 1, height: 1 }; // the plan's, and the size of a pane in px
 
 // Zooms so that the place under a pixel of a pane stays there.
@@ -24,9 +25,17 @@ function zoomTo(times) {
   zoom.times = times;
 }
 
+// Keeps the people in groups in the middle, until somebody zooms.
+function follow() {
+  const rows = truth ? [...truth.rows(state.frame)].filter(row => truth.group[row] >= 0) : [];
+  const mean = values => rows.reduce((sum, row) => sum + values[row], 0) / rows.length;
+  if (rows.length && zoom.times === FOLLOWED) zoom.centre = [mean(truth.x), mean(truth.y)];
+}
+
 function listenToZoom(canvas, show) {
-  const inPane = event => [event.offsetX % zoom.width, event.offsetY];
+  const inPane = event => [event.offsetX % zoom.width, event.offsetY % zoom.height];
   canvas.addEventListener("wheel", event => {
+    if (data.opening && !event.ctrlKey) return; // the report scrolls
     event.preventDefault();
     zoomBy(event.deltaY < 0 ? 1.25 : 0.8, ...inPane(event));
     show();
@@ -46,13 +55,11 @@ function drawPlan(canvas, frame, options) {
   const [x0, y0, x1, y1] = data.bounds;
   const there = sides.filter(side => options[side.name]);
   const parts = splitPanes(there.filter(side => side.plane === "ground"), options.beside);
-  const own = Math.min(Math.max((y1 - y0) / (x1 - x0), 0.35), 1.1);
-  const aspect = (hasImage ? data.image[1] / data.image[0] : own) / splitPanes(there, options.beside).length;
-  const [ctx, width, height] = prepareCanvas(canvas, aspect);
-  const w = width / parts.length;
-  parts.forEach((shown, k) => {
-    const title = paneTitle(parts, shown);
-    inPane(ctx, k * w, 0, w, height, title, () => planPane(ctx, w, height, shown, frame, options));
+  const own = Math.min(Math.max((y1 - y0) / (x1 - x0), 0.35), data.opening ? 0.5 : 1.1);
+  const panes = splitPanes(there, options.beside).length;
+  const aspect = (hasImage && !data.opening ? data.image[1] / data.image[0] : own) * parts.length / panes;
+  drawPanes(canvas, parts.length, aspect, (k, ctx, x, y, w, h) => {
+    inPane(ctx, x, y, w, h, paneTitle(parts, parts[k]), () => planPane(ctx, w, h, parts[k], frame, options));
   });
 }
 
@@ -74,6 +81,7 @@ function planPane(ctx, width, height, shown, frame, options) {
   if (options.trails) for (const side of people) drawTrails(plan, side, map);
   if (options.detections && found && found.plane !== "image") drawPlanDetections(plan);
   for (const side of people) drawPlanPeople(plan, side);
+  drawErrorsHere(plan, shown, Math.max(0.6 * scale, 11), (side, row) => [positionOf(plan, side, row)]);
   if (options.ids) drawPersonIds(plan, people.filter(side => side.rows(frame).length <= MANY));
   if (options.ids) for (const side of wholeGroups) drawWholeGroupIds(plan, side, map);
 }

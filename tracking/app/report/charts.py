@@ -35,7 +35,9 @@ def charts(report: Report) -> Json:
     """Returns the charts of a report as JSON for Bokeh, by the id of the HTML element that each fills."""
     found: dict[str, Any] = {}
     if report.curves:
-        found["chart-shares"] = _curves(report.curves, report.curves.shares, f"share of the oracle's {report.by}")
+        if report.curves.shares:
+            by = f"share of the oracle's {report.by}"
+            found["chart-shares"] = _curves(report.curves, report.curves.shares, by)
         found["chart-curves"] = _curves(report.curves, report.curves.curves, report.by)
     if report.causes:
         found["chart-causes"] = _causes(report.causes)

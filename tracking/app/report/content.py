@@ -102,6 +102,15 @@ class Moment:
 
 
 @dataclass(frozen=True)
+class Opening:
+    """The replay with which a report opens."""
+
+    words: str
+    page: str  # HTML of its page
+    address: str  # of the same replay as a page of its own
+
+
+@dataclass(frozen=True)
 class Report:
     """The whole content of a report; parts that are empty or None are not shown."""
 
@@ -119,3 +128,4 @@ class Report:
     moments: SequenceOf[Moment] = ()
     failures: SequenceOf[Json] = ()  # episodes that a tracker could not finish, as in stress.json
     sequences: SequenceOf[tuple[str, str, float]] = ()  # name, address of its page, score: worst first
+    opening: Opening | None = None

@@ -11,7 +11,7 @@ from dataclasses import replace
 import cv2
 
 from scenarios.errors import InputError
-from sim.types import Sequence
+from sim.types import Image, Sequence
 from tracking.app.replay_page.page import Run, page_data, script_json
 from tracking.app.report.content import Moment, Played
 from tracking.errors.found import CauseRow, FoundError, RunErrors, errors_of_run, sums_by_cause
@@ -64,7 +64,7 @@ def moments(played: SequenceOf[Played], runs: Runs) -> list[Moment]:
 
 
 def _moment(one: Played, sequence: Sequence, runs: list[Run]) -> Moment:
-    dearest = max(runs[0].errors, key=lambda error: error.cost or 0.0, default=None)
+    dearest = dearest_error(runs[0].errors)
     length = sequence.length or len(runs[0].tracks)
     first, last = (1, length) if dearest is None else (dearest.error.start, dearest.error.end)
     around, longest = round(AROUND * sequence.fps), round(LONGEST * sequence.fps)
@@ -75,6 +75,11 @@ def _moment(one: Played, sequence: Sequence, runs: list[Run]) -> Moment:
     data["background"], data["video"] = _background(sequence), None
     kind, words = ("", "") if dearest is None else (dearest.error.kind, _words(dearest))
     return Moment(one, (first - 1) / sequence.fps, kind, words, script_json(data))
+
+
+def dearest_error(errors: SequenceOf[FoundError]) -> FoundError | None:
+    """Returns the error whose repair alone adds most, None without errors."""
+    return max(errors, key=lambda error: error.cost or 0.0, default=None)
 
 
 def cause_rows(found: SequenceOf[tuple[str, RunErrors]]) -> list[tuple[str, CauseRow]]:
@@ -109,5 +114,10 @@ def _background(sequence: Sequence) -> str | None:
     pictures = sequence.background() if sequence.has_images else None
     if pictures is None or not len(pictures):
         return None
-    _, jpeg = cv2.imencode(".jpg", pictures[-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    return data_address(pictures[-1])
+
+
+def data_address(picture: Image) -> str:
+    """Returns the address of a picture as JPEG that holds its bytes."""
+    _, jpeg = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
     return f"data:image/jpeg;base64,{base64.b64encode(jpeg.tobytes()).decode()}"

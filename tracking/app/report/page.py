@@ -17,8 +17,8 @@ from tracking.scoring.catalogue import CATALOGUE
 HERE = Path(__file__).parent
 KEYS = ("HOTA", "MOTA", "IDF1", "group_F1", "pairwise_F1", "event_F1")  # scores beside the one that ranks
 PARTS = {
-    "ranking": "Ranking", "heat": "Scenes", "curves": "Curves", "matrices": "Matrices", "moments": "Worst moments",
-    "causes": "Causes", "sequences": "Sequences", "failures": "Failures",
+    "ranking": "Ranking", "heat": "Scenes", "curves": "Curves", "matrices": "Matrices", "causes": "Causes",
+    "moments": "Worst moments", "sequences": "Sequences", "failures": "Failures",
 }  # fmt: skip
 
 

@@ -69,6 +69,18 @@ function onKey(event) {
   if (event.key === "Escape") $("player").close();
 }
 
+// The replay with which the report opens: as high as its content; space and arrows reach it from the page around it.
+function listenToOpening(frame) {
+  const inner = frame.contentDocument;
+  new ResizeObserver(() => { frame.style.height = `${inner.body.offsetHeight + 4}px`; }).observe(inner.body);
+  document.addEventListener("keydown", event => {
+    const { key, shiftKey, target } = event, shown = frame.getBoundingClientRect().bottom > 0;
+    if (target !== document.body || !shown || ![" ", "ArrowLeft", "ArrowRight"].includes(key)) return;
+    event.preventDefault();
+    inner.dispatchEvent(new frame.contentWindow.KeyboardEvent("keydown", { key, shiftKey }));
+  });
+}
+
 // Tables that are wider than the page say so; in closed parts their width is known when they open.
 const widths = new ResizeObserver(entries => {
   for (const { target } of entries) {
@@ -78,6 +90,11 @@ const widths = new ResizeObserver(entries => {
 });
 for (const table of document.querySelectorAll(".wide, .wide > table")) widths.observe(table);
 
+const opening = document.querySelector("#opening iframe");
+if (opening) {
+  if (opening.contentDocument.getElementById("data") && opening.contentDocument.readyState === "complete") listenToOpening(opening);
+  else opening.addEventListener("load", () => listenToOpening(opening));
+}
 drawCharts();
 if (items.length) {
   filter();

@@ -29,6 +29,7 @@ EMPTY = dict.fromkeys(("truth", "tracks", "detections", "bounds", "image", "vide
 def ran(data: dict, scripts: tuple[str, ...], what: str) -> list:
     """The value of an expression after some of the page's scripts have been read."""
     page = f"const document = {{ getElementById: () => ({{ textContent: {json.dumps(json.dumps(data))} }}) }};"
+    page += "const matchMedia = () => ({ matches: false });"
     code = "\n".join([page, *((HERE / name).read_text(encoding="utf-8") for name in scripts)])
     done = subprocess.run(
         [str(NODE), "-"], input=f"{code}\nconsole.log(JSON.stringify({what}));", capture_output=True, text=True,
@@ -74,3 +75,11 @@ def test_places_on_the_ground_are_where_the_camera_sees_them(radial: float) -> N
     seen = np.isfinite(uv[:, 0]) & (np.abs(uv) < 1500).all(axis=1)
     assert 50 < seen.sum() < len(xy)
     np.testing.assert_allclose(found[seen], uv[seen], atol=0.05)
+
+
+def test_errors_are_named_for_a_second_the_latest_two() -> None:
+    spans = {"a": (1, 40), "b": (10, 10), "c": (12, 30), "d": (31, 33)}
+    errors = [{"side": "tracks", "kind": kind, "start": a, "end": b} for kind, (a, b) in spans.items()]
+    data = EMPTY | {"fps": 10, "errors": [*errors, {"side": "other", "kind": "e", "start": 1, "end": 99}]}
+    what = "[9, 20, 21, 33, 41, 42, 51].map(f => errorsAt({ name: 'tracks' }, f).map(error => error.kind).join(''))"
+    assert ran(data, ("decode.js", "draw.js"), what) == ["a", "cb", "ca", "da", "d", "", ""]
