@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.relational.observed import LABELS
 from benchmarks.support import chart, tables
 from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA
 from scenarios.loading.resolve import resolve
 from sim.sequence import simulate
 from sim.types import Array, Bools, Context, Detections, Frame, Plane, Sequence, Tracks, Truth
 from tracking.filters.assignment import optimal
-from tracking.fitting.relational import LABELS
 from tracking.papers.relational.config import ParticleConfig
 from tracking.recordings.source import open_source
 from tracking.running.prepare import prepare

@@ -418,6 +418,4 @@ class FitRelationalOptions(Options, words="fit relational", run="fit:fit_relatio
     names: list[str] = NAMES()
     out: Path = TOML("File to write: parameters of relational, for --params.")
     seeds: str = SEEDS(SEEDS_HELP, "30000:30004")
-    observed: bool = option(
-        "Learn speed table and noise of positions from successive detections, as the paper does.", False)
 # fmt: on

@@ -7,11 +7,12 @@ import dataclasses
 import numpy as np
 import pytest
 
+from benchmarks.relational.observed import LABELS, fit_observed
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tracking.fitting import joint_events
-from tracking.fitting.relational import LABELS, fit_observed, fit_relational
+from tracking.fitting.relational import fit_relational
 from tracking.papers.relational.config import RelationalConfig
 
 

@@ -109,22 +109,13 @@ def fit_joint(options: FitJointOptions) -> CommandResult:
 
 def fit_relational(options: FitRelationalOptions) -> CommandResult:
     """Writes the fitted parameters of `relational` as a TOML file."""
-    from scenarios.loading.resolve import resolve
-    from sim.sequence import simulate
     from sim.store.atomic import write_file
     from tracking.fitting import relational
     from tracking.papers.relational.config import RelationalConfig
 
     out, seeds = output_file(options.out, ".toml"), option_parsing.seeds(options.seeds)
-    params: dict[str, float | list[float]]
-    if options.observed:
-        entries = [entry for name in options.names for entry in resolve(name, relational.LABELS)]
-        scenes = (simulate(entry.scenario, seed, entry.repeat, ()) for entry in entries for seed in seeds)
-        ends = relational.PAPER_ENDS
-        params = {"speed_ends": list(ends), **relational.fit_observed(scenes, ends)}
-    else:
-        truths = (truth for _, truth in _simulated(options.names, seeds))
-        params = relational.fit_relational(truths, RelationalConfig().speed_ends)
+    truths = (truth for _, truth in _simulated(options.names, seeds))
+    params = relational.fit_relational(truths, RelationalConfig().speed_ends)
     config = RelationalConfig.from_dict(dict(params), out)
     write_file(out, f"# flockscope fit relational\n{config.to_toml()}".encode())
     width, body = max(map(len, params)), config.as_dict()
