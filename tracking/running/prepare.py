@@ -144,8 +144,8 @@ class InputFrames:
     detections: Iterable[Detections | None] = ()
 
     def kept(self) -> InputFrames:
-        """Returns a copy that holds all frames, which else are made anew for each iteration, without `detections`."""
-        return replace(self, frames=self.frames and tuple(self.frames), detections=())
+        """Returns a copy that holds all frames, which else are made anew for each iteration."""
+        return replace(self, frames=self.frames and tuple(self.frames), detections=tuple(self.detections))
 
 
 def input_frames(
