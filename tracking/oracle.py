@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from collections.abc import Sequence as SequenceOf
 from dataclasses import replace
-from itertools import islice, pairwise
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -85,7 +85,7 @@ def _named(
         seen = inputs(mode, needs, seed)
     reported = [
         _tracks(f.index, f.t, d.plane, (np.arange(len(d.pos)), np.full(len(d.pos), -1)), d.pos, d.box, d.score)
-        for f in islice(seen.frames or (), truth.length) if (d := f.detections) is not None
+        for f in (seen.frames or ())[: truth.length] if (d := f.detections) is not None
     ]  # fmt: skip
     (compared,) = (scorer or Scorer(truth)).compare([reported], similarity, None)
     sides, true, pairs = compared.sides, compared.sides.true, compared.people

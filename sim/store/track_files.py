@@ -207,7 +207,7 @@ def tracks_files(
     files = {
         EXACT: track_table(rows, every, fps),
         "tracks.txt": mot_text(rows.frame, rows.id, text_box, score_and_place(rows.score, place)),
-        "tracks.mot.txt": mot_text(rows.frame, rows.id, text_box, (f"{score:.4f}" for score in rows.score)),
+        "tracks.mot.txt": mot_text(rows.frame, rows.id, text_box, (f"{score:.4f}" for score in rows.score.tolist())),
     }
     first = every[0].index if every else 1
     groups = [t.groups for t in every]

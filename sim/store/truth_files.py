@@ -6,7 +6,6 @@ is written only for a truth with boxes.
 
 from __future__ import annotations
 
-import io
 import math
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -83,13 +82,13 @@ def has_box(box: Array) -> Bools:
 
 def mot_text(frame: Ints, id: Ints, box: Array, rest: Iterable[str]) -> bytes:
     """Returns a MOTChallenge text: of each row frame, id, box and the cells `rest`; an unknown box is -1,-1,-1,-1."""
-    text = io.BytesIO()
-    # rows of arrays: lists of all their numbers or lines would need more memory than the text
+    lines = []
+    # rows of arrays: lists of all their numbers would need more memory than the text
     for f, i, row, boxed, end in zip(frame, id, box, has_box(box), rest, strict=True):
         left, top, width, height = row.tolist()
         corner = f"{left:.2f},{top:.2f},{max(width, 0.01):.2f},{max(height, 0.01):.2f}" if boxed else "-1,-1,-1,-1"
-        text.write(f"{f},{i},{corner},{end}\n".encode())
-    return text.getvalue()
+        lines.append(f"{f},{i},{corner},{end}\n")
+    return "".join(lines).encode()
 
 
 def score_and_place(score: Array, place: Array | None) -> Iterator[str]:

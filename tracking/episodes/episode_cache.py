@@ -110,7 +110,7 @@ class OpenedSource:
 
         key = (mode, "boxes" in needs, "points" in needs, seed if mode == "truth" else 0)
         if key not in self._inputs:
-            self._inputs[key] = self.kept.add(input_frames(mode, needs, self.sequence, {}, seed, owned=True).kept())
+            self._inputs[key] = self.kept.add(input_frames(mode, needs, self.sequence, {}, seed, owned=True))
         return self._inputs[key]
 
 

@@ -10,11 +10,10 @@ no more than it lists: `as_needed`.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass
-from itertools import pairwise
-from typing import Any, Generic, Literal, TypeVar
+from typing import Any, Literal
 
 import numpy as np
 
@@ -24,7 +23,6 @@ from sim.types import DetectionMode, Detections, Frame, Ints, Sequence
 from tracking.running.tracks_check import finite
 
 InputKind = Literal["points", "boxes", "pixels", "stereo"]
-T = TypeVar("T")
 
 
 def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: DetectionMode | None) -> DetectionMode:
@@ -67,21 +65,11 @@ def input_kind(needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, 
 
 
 @dataclass(frozen=True, eq=False)
-class Reread(Generic[T]):
-    """Items that are made anew for each iteration, so that a long recording holds none of them. make: an iterator."""
-
-    make: Callable[[], Iterator[T]]
-
-    def __iter__(self) -> Iterator[T]:
-        return self.make()
-
-
-@dataclass(frozen=True, eq=False)
 class Given:
     """The detections of frames 1, 2, … of a sequence, None for a frame without a detector. owners: of each frame the
     ids (M,) of the people whom the detections show, -1 for a false alarm; None if unknown."""
 
-    detections: Iterable[Detections | None]
+    detections: SequenceOf[Detections | None]
     owners: SequenceOf[Ints] | None = None
 
 
@@ -95,7 +83,7 @@ def given_detections(
 
         return Given(*from_truth(sequence, sensor, seed))
     owners = sequence.load_owners() if owned and sequence.load_owners is not None else None
-    return Given(Reread(lambda: (f.detections for f in sequence.without_pictures())), owners)
+    return Given([f.detections for f in sequence.without_pictures()], owners)
 
 
 def as_needed(given: Given, needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence) -> Given:
@@ -106,11 +94,11 @@ def as_needed(given: Given, needs: tuple[str, ...], mode: DetectionMode, sequenc
     Without a camera it is the middle of the box. Raises InputError if the needs lack "points" and there are no boxes.
     """
     if "boxes" not in needs:
-        return Given(Reread(lambda: (d and d.replace(box=None) for d in given.detections)), given.owners)
+        return Given([None if d is None else d.replace(box=None) for d in given.detections], given.owners)
     if "points" in needs:
         return given
-    boxless = {d.box is None for d in given.detections if d is not None and len(d.pos)}
-    if boxless == {True}:
+    nonempty = [d for d in given.detections if d is not None and len(d.pos)]
+    if nonempty and all(d.box is None for d in nonempty):
         got, remedy = f"points alone, in {sequence.name}", "take a tracker that takes points"
         raise InputError(place=f"--detections {mode}", got=got, expected="boxes", remedy=remedy)
     boxes = [np.zeros((0, 4)) if d is None or d.box is None else d.box for d in given.detections]
@@ -120,25 +108,20 @@ def as_needed(given: Given, needs: tuple[str, ...], mode: DetectionMode, sequenc
     else:
         pos = standing_points(box, camera, sequence.scene)
     there = np.isfinite(pos).all(axis=1) | ~np.isfinite(box).all(axis=1)  # check_detections names a box that is nan
-    cuts = np.cumsum([0, *map(len, boxes)], dtype=int)
-
-    def found() -> Iterator[Detections | None]:
-        for d, (a, b) in zip(given.detections, pairwise(cuts), strict=True):
-            if d is None or (d.box is None and len(d.pos)):
-                yield d
-            else:
-                yield d.replace(plane=plane, pos=pos[a:b], vel=None, box=box[a:b]).keep(there[a:b])
-
+    cuts = np.cumsum([*map(len, boxes)], dtype=int)
+    places, kept = np.split(pos, cuts)[:-1], np.split(there, cuts)[:-1]
+    found = [
+        d if d is None or (d.box is None and len(d.pos)) else d.replace(plane=plane, pos=p, vel=None, box=b).keep(rows)
+        for d, p, b, rows in zip(given.detections, places, boxes, kept, strict=True)
+    ]
     owners = given.owners
-    kept = None if owners is None else [w[there[a:b]] for w, (a, b) in zip(owners, pairwise(cuts), strict=True)]
-    return Given(Reread(found), kept)
+    return Given(found, owners and [who[rows] for who, rows in zip(owners, kept, strict=True)])
 
 
-def as_frames(detections: Iterable[Detections | None], fps: float) -> Iterable[Frame]:
+def as_frames(detections: Iterable[Detections | None], fps: float) -> tuple[Frame, ...]:
     """Returns frames without pictures that have these detections."""
-    # A slice would show later frames as its base: copies.
-    every = Reread(lambda: enumerate(detections, 1))
-    return Reread(lambda: (Frame(k, (k - 1) / fps, detections=d and d.copy()) for k, d in every))
+    own = (None if d is None else d.copy() for d in detections)  # a slice would show later frames as its base
+    return tuple(Frame(k, (k - 1) / fps, detections=d) for k, d in enumerate(own, 1))
 
 
 def check_detections(detections: Detections, needs: tuple[str, ...]) -> None:

@@ -7,7 +7,7 @@ out. `tracking.running.run.track` is the loop over it. The environment drives a 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from collections.abc import Sequence as SequenceOf
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -55,7 +55,7 @@ class PreparedTracker:
     mode: DetectionMode
     sequence: Sequence
     # with detections and without pictures; None: the sequence's own frames (mode "image")
-    frames_given: Iterable[Frame] | None
+    frames_given: tuple[Frame, ...] | None
     given: InputFrames | None = None  # as `frames_given`, and what these were chosen from
     scale_frames: int = 0  # as of ImageScale
     history: ReportHistory = field(default_factory=ReportHistory)  # what the tracker has reported since `reset`
@@ -138,14 +138,10 @@ class InputFrames:
     """What a tracker gets of a sequence in one mode: the frames (None in the mode "image"), by frame the owners of the
     detections (None if unknown), the image scale, and the detections before the tracker's needs chose from them."""
 
-    frames: Iterable[Frame] | None
+    frames: tuple[Frame, ...] | None
     owners: SequenceOf[Ints] | None
     scale: ImageScale
-    detections: Iterable[Detections | None] = ()
-
-    def kept(self) -> InputFrames:
-        """Returns a copy that holds all frames, which else are made anew for each iteration."""
-        return replace(self, frames=self.frames and tuple(self.frames), detections=tuple(self.detections))
+    detections: SequenceOf[Detections | None] = ()
 
 
 def input_frames(
