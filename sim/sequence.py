@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
 from functools import cache, lru_cache
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
@@ -37,15 +37,11 @@ class LabelledSequence(Sequence):
     @property
     def truth(self) -> Truth:
         """The truth, computed on first use and then kept."""
-        found = super().truth
-        assert found is not None
-        return found
+        return cast("Truth", super().truth)
 
     def frame_truth(self, index: int) -> FrameTruth:
         """Returns the truth of frame `index` (from 1); its `pixels` are given if the sequence has `load_pixels`."""
-        found = super().frame_truth(index)
-        assert found is not None
-        return found
+        return cast("FrameTruth", super().frame_truth(index))
 
 
 def simulate(
