@@ -89,7 +89,7 @@ def test_the_replay_plays_and_names_errors(page: Page, index: Path) -> None:
     page.wait(f"{INNER}.querySelector('video')?.readyState > 1 && {STATE} === 'Pause'")
     first = page.value(FRAME)
     page.wait(f"{FRAME} !== {first}")
-    page.wait(f"{INNER}.querySelector('#now .kind')")
+    page.wait(f"{INNER}.querySelector('#now .kind') !== null")
     page.press(" ")
     page.wait(f"{STATE} === 'Play'")
     still = page.value(FRAME)
