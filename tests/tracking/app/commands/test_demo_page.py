@@ -47,7 +47,7 @@ def test_best_and_worst(
     found = [{"HOTA": h, "group_F1": g} for h, g in zip(hota, (1.0, 0.6, 0.2), strict=True)]
     judged = demo.JudgedRuns(
         ScoringJob(("a", "b", "c")), SimpleNamespace(scores=found), [SimpleNamespace(errors=())] * 3
-    )  # type: ignore[arg-type]  # fmt: skip
+    )  # fmt: skip
     monkeypatch.setattr(demo, "read_runs", lambda _, job: job.sources)
     runs, by, values = demo._best_and_worst(sequence, judged, ["a", "b", "c"], "group_F1")
     assert ([run.name for run in runs], by, values) == (ends, key, scores)
