@@ -47,7 +47,7 @@ def test_best_and_worst(
     found = [{"HOTA": h, "group_F1": g} for h, g in zip(hota, (1.0, 0.6, 0.2), strict=True)]
     judged = demo.JudgedRuns(
         ScoringJob(("a", "b", "c")), SimpleNamespace(scores=found), [SimpleNamespace(errors=())] * 3
-    )  # type: ignore[arg-type]  # fmt: skip
+    )  # fmt: skip
     monkeypatch.setattr(demo, "read_runs", lambda _, job: job.sources)
     runs, by, values = demo._best_and_worst(sequence, judged, ["a", "b", "c"], "group_F1")
     assert ([run.name for run in runs], by, values) == (ends, key, scores)
@@ -89,7 +89,7 @@ def test_the_replay_plays_and_names_errors(page: Page, index: Path) -> None:
     page.wait(f"{INNER}.querySelector('video')?.readyState > 1 && {STATE} === 'Pause'")
     first = page.value(FRAME)
     page.wait(f"{FRAME} !== {first}")
-    page.wait(f"{INNER}.querySelector('#now .kind')")
+    page.wait(f"{INNER}.querySelector('#now .kind') !== null")
     page.press(" ")
     page.wait(f"{STATE} === 'Play'")
     still = page.value(FRAME)
