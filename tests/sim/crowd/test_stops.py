@@ -43,6 +43,13 @@ def test_a_group_stands_at_its_stop_for_its_time_and_then_leaves(path: Path) -> 
     assert not motion.present[-1].any()
 
 
+def test_a_group_at_its_stop_is_not_stuck_and_one_on_the_way_may_be(path: Path) -> None:
+    long = STOP.replace("stay = 6", "stay = 60")
+    assert run(load(path, [long]), 1).never_arrive == ()
+    (stuck,) = run(load(path, [long, "world.walls=[[10, 0, 10, 20]]"]), 1).never_arrive
+    assert stuck.group == "a"
+
+
 def test_people_wait_until_a_time(path: Path) -> None:
     other = "group.b={ size = 1, start = [10, 14], goal = [27, 14], at_goal = 'leave' }"
     stops = [f"group.{g}.stops=[{{ at = [14, {y}], until = [2, 15], stay = 1 }}]" for g, y in (("a", 10), ("b", 13))]

@@ -66,6 +66,15 @@ def test_new_frames_of_the_empty_scene_are_background_at_about_the_detection_rat
         assert 0.008 < share(kinds, kind) < 0.014
 
 
+@pytest.mark.parametrize("channel", range(3))
+def test_a_pixel_with_one_channel_that_never_keeps_its_level_has_no_background(channel):
+    sample = shots(scene(20, 20), 30).copy()
+    sample[:, 5:9, 5:9, channel] = np.linspace(0, 250, 30)[:, None, None]
+    made = train(read_only(sample), 0.999, False)
+    assert not made.valid[5:9, 5:9].any()
+    assert made.valid.sum() == 400 - 16
+
+
 # --- the five classes -------------------------------------------------------------------------------------------------
 
 

@@ -72,6 +72,13 @@ def test_with_a_camera_a_tenth_of_the_height_is_learned(seen, learned):
     assert size.at(foot)[:, 0] == pytest.approx(learned * h, rel=0.03)
 
 
+@pytest.mark.parametrize(("level", "learned"), [(24.0, True), (10.0, False)])
+def test_people_count_from_their_height_however_slim(level, learned):
+    box, size = blobs(np.random.default_rng(0), 60, level=level, slope=0.0), PersonSize(BARE)
+    size.learn(box, ellipses(box), np.ones(60, bool))
+    assert size.reliable == learned
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_the_line_is_found_among_groups_and_pieces(seed):
     r = np.random.default_rng(seed)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tracking.scoring.people_and_groups import true_groups, true_people
 
 from sim.geometry.polygons import footprint_hulls
 from tests.hand_made import Scene, event, tracks, truth

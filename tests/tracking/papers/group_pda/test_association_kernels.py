@@ -9,6 +9,7 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from filterpy.kalman import KalmanFilter
+from scipy.stats import multivariate_normal, norm
 
 from tests import reference_group_pda as reference
 from tracking.filters.components import Constraint
@@ -16,7 +17,7 @@ from tracking.grouping.whole_groups import NO_ID
 from tracking.papers.group_pda import association_kernels as kernels
 from tracking.papers.group_pda.association import PointClaims, place_density, point_log_density, remember
 from tracking.papers.group_pda.association_kernels import any_within, displacement
-from tracking.papers.group_pda.association_mass_kernels import centroid_noise
+from tracking.papers.group_pda.association_mass_kernels import NEWCOMERS, centroid_noise, log_count, log_density
 from tracking.papers.group_pda.config import GroupPdaConfig
 from tracking.papers.group_pda.group_bank import GroupBank, MemberPlaces, Unshared, newborn
 from tracking.papers.group_pda.merging_and_splitting import merged
@@ -322,3 +323,10 @@ def test_gate_factor() -> None:
     points = gaussian(100_000)
     inside = points[np.square(points).sum(1) < 6.0]
     assert np.var(inside, axis=0) == pytest.approx(gate_factor(6.0), rel=1e-3)
+
+
+def test_masses_are_densities():
+    S, at = np.array([[0.5, 0.2], [0.2, 0.3]]), np.array([0.4, -0.7])
+    assert log_density(*at, S[[0, 0, 1], [0, 1, 1]]) == pytest.approx(multivariate_normal([0, 0], S).logpdf(at))
+    tail = NEWCOMERS * 6 / (6 + 4) ** 2
+    assert np.exp(log_count(4.0, 5.0, 2.0)) == pytest.approx(tail + (1 - NEWCOMERS) * norm(5, np.sqrt(2)).pdf(4))

@@ -80,6 +80,16 @@ def uniform(people, count):
     return label[0]
 
 
+@pytest.mark.parametrize("people", [1, 12, 500])
+def test_numbers_of_boxes_have_stams_probabilities_for_any_number_of_people(people):
+    shares = np.diff(stam_cumulated(people), prepend=0.0)
+    m = np.arange(1, len(shares) + 1)
+    likely = shares[:-1] > 1e-9
+    ratio = people * np.log(m[1:] / m[:-1]) - np.log(m[1:])
+    assert np.log(shares[1:][likely] / shares[:-1][likely]) == pytest.approx(ratio[likely], abs=1e-5)
+    assert shares[-1] < 1e-9
+
+
 def test_partitions_are_drawn_uniformly():
     """E7: chi-squared of the 15 partitions of 4 people, 14 degrees of freedom; 36.1 is the quantile 0.999."""
     drawn = uniform(4, 60_000)
