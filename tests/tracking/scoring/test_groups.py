@@ -8,6 +8,8 @@ import pytest
 from sim.geometry.polygons import footprint_hulls
 from tests.hand_made import Scene, event, tracks, truth
 from tracking.scoring import evaluate
+from tracking.scoring.group_rows import true_groups
+from tracking.scoring.people import true_people
 
 APART = {1: (0.5, 0.5), 2: (1.5, 0.5), 3: (3.2, 0.5), 4: (3.8, 0.5)}
 
