@@ -37,6 +37,7 @@ from benchmarks.support.options import new_parser, one_thread
 from benchmarks.support.tables import head, row, share
 from scenarios.errors import FlockscopeError
 from scenarios.loading.resolve import resolve
+from scenarios.loading.toml_files import Setting
 from scenarios.schema.scenario import Scenario
 from sim.render.weather import brightness
 from sim.sequence import simulate
@@ -118,8 +119,8 @@ def _kept(t: Tracks, kept: Array) -> Tracks:
     return t.replace(**rows, box=box, score=t.score[kept] if len(t.score) else t.score)
 
 
-def _hidden(value: float) -> list[str]:
-    return [f"sensor.hide=[{{ start = 2.0, end = {2 + value:.10g} }}]"] if value else []
+def _hidden(value: float) -> list[Setting]:
+    return [Setting("sensor.hide", [{"start": 2.0, "end": 2 + value}])] if value else []
 
 
 WEAKNESSES = (
@@ -127,11 +128,11 @@ WEAKNESSES = (
         "forgets", forgets, Axis("hidden", 0.0, 3.0, _hidden), "IDF1", SCENE.format(duration=8.0, size=1, repeat=3), 1.0
     ),
     Weakness(
-        "thirty", first_thirty, Axis("people", 6, 60, lambda v: [f"group.a.repeat={v:.0f}"], whole=True), "DetRe",
+        "thirty", first_thirty, Axis("people", 6, 60, lambda v: [Setting("group.a.repeat", round(v))], whole=True), "DetRe",
         SCENE.format(duration=2.0, size=1, repeat=6), 30 / (SHARE * 0.9),
     ),
     Weakness(
-        "confuses", confuses, Axis("spacing", 1.5, 0.5, lambda v: [f"crowd.spacing={v:.10g}"]), "IDF1",
+        "confuses", confuses, Axis("spacing", 1.5, 0.5, lambda v: [Setting("crowd.spacing", v)]), "IDF1",
         SCENE.format(duration=4.0, size=2, repeat=2),
     ),
 )  # fmt: skip
@@ -206,7 +207,7 @@ def breaks(runs: int, episodes: int, folder: Path) -> None:
 
 LOSS, NOISE, BEST = 0.5, 0.03, 0.9
 SUITE = "standard"
-SWITCH = Axis("switch", 1.0, 16.0, lambda value: [f"light.switch=[{{ at = {value:.10g}, gain = 0.7 }}]"])
+SWITCH = Axis("switch", 1.0, 16.0, lambda value: [Setting("light.switch", [{"at": value, "gain": 0.7}])])
 TUNED = ((AXES["detection"], AXES["clutter"], AXES["noise"]), range(20_000, 20_005), 0)
 # By weakness: axes, seeds of the scenes, seed of the first search. `search` was tuned on the first two.
 LIGHT = ((SWITCH, AXES["detection"], AXES["clutter"]), range(23_000, 23_005), 2000)

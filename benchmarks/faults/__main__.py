@@ -99,6 +99,8 @@ def judged(found: RunErrors, before: RunErrors, made: Fault) -> dict[str, bool]:
 def _span(one: FoundError) -> Span:
     error = one.error
     people = error.people if isinstance(error, GroupError) else () if error.person is None else (error.person,)
+    if error.kind == "engulfed group":
+        people += error.others
     return error.kind, error.start, error.end, frozenset(people)
 
 

@@ -122,12 +122,14 @@ def engulfed(of: FaultScene) -> Iterator[Callable[[], Fault]]:
                 yield lambda rows=rows, a=members, b=others: _one_group(of, rows, (a, b))
 
 
-def _one_group(of: FaultScene, rows: slice, parts: tuple[Ints, ...], kind: str = "engulfed group") -> Fault:
+def _one_group(of: FaultScene, rows: slice, parts: tuple[Ints, ...]) -> Fault:
+    """Returns the fault of one tracked group in place of several; it is one error, which names all their people."""
     every = np.concatenate(parts)
     lost = [part for part in parts if 2 * len(part) <= len(every)]
     causes = {_cause(of, _middle(rows), part, np.setdiff1d(every, part)) for part in lost}
     told = changed(of.told, rows, every, label=NEW)
-    return Fault(told, tuple(_span(of, kind, rows, p) for p in lost), causes.pop() if len(causes) == 1 else None)
+    expected = (_span(of, "engulfed group", rows, every),) if lost else ()
+    return Fault(told, expected, causes.pop() if len(causes) == 1 else None)
 
 
 def strangers(of: FaultScene) -> Iterator[Callable[[], Fault]]:
