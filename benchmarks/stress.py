@@ -128,7 +128,8 @@ WEAKNESSES = (
         "forgets", forgets, Axis("hidden", 0.0, 3.0, _hidden), "IDF1", SCENE.format(duration=8.0, size=1, repeat=3), 1.0
     ),
     Weakness(
-        "thirty", first_thirty, Axis("people", 6, 60, lambda v: [Setting("group.a.repeat", round(v))], whole=True), "DetRe",
+        "thirty", first_thirty,
+        Axis("people", 6, 60, lambda v: [Setting("group.a.repeat", round(v))], whole=True), "DetRe",
         SCENE.format(duration=2.0, size=1, repeat=6), 30 / (SHARE * 0.9),
     ),
     Weakness(
