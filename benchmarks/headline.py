@@ -87,7 +87,7 @@ def speed() -> str:
         if row["HOTA, CLEAR, Identity of 1000 frames × 30 people"] == "TrackEval"
     )
     return (
-        f"- **Speed**: the simulator makes {min(ratios)} to {max(ratios)} times as many steps as JuPedSim with"
+        f"- **Speed**: the simulator makes {min(ratios)} to {max(ratios)} times as many steps a CPU second as JuPedSim, with"
         f" {simulated[0]['people']} to {simulated[-1]['people']} people; HOTA, CLEAR and Identity equal TrackEval's and"
         f" take a {number(faster, 0)}th of its time ([table](docs/results/cost.md))."
     )
@@ -99,8 +99,8 @@ def tuning() -> str:
     scenes, real = (" and ".join(signed(row[k]) for row in plain) for k in (2, 4))
     return (
         f"What it earns: a nearest-neighbour tracker gains HOTA {scenes} on scenes like two recordings, and {real} on"
-        " the recordings themselves; `blob`, whose defaults are tuned,"
-        f" {' and '.join(signed(row[4]) for row in blob)} there"
+        " the recordings themselves; `blob`, whose defaults are tuned already, there"
+        f" {' and '.join(signed(row[4]) for row in blob)}"
         " ([table](docs/results/trackers.md#does-tuning-on-simulated-scenes-help-on-recordings); a star: the 95 %"
         " interval does not hold 0)."
     )

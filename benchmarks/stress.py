@@ -49,7 +49,8 @@ from tracking.running.tracker_registry import find
 from tracking.scoring.evaluation import Scorer
 from tracking.stats import mean_interval
 from tracking.stress import failures, minimize
-from tracking.stress.axes import AXES, Axis, breaking_point, crossing
+from tracking.stress.axes import AXES, Axis
+from tracking.stress.breaking_points import breaking_point, crossing
 from tracking.stress.reductions import difficulties
 from tracking.stress.scene_player import OracleTask, Outcome, Store, Tasks
 from tracking.stress.sweep import Plan, Sweep

@@ -29,8 +29,8 @@ from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE
 from benchmarks.support.replaced_code import Replacement, replaced_code
 from benchmarks.support.tables import difference_cell, head, row
 from tracking.filters import existence
-from tracking.papers.blob import track_management, update_from_boxes
-from tracking.papers.blob import track_management_kernels as kernels
+from tracking.papers.blob import tracked_people, update_from_boxes
+from tracking.papers.blob import tracked_people_kernels as kernels
 from tracking.recordings.source import open_source
 
 DOUBLED = 0.1
@@ -47,7 +47,7 @@ PARTS: dict[str, Replacement] = {
     "no spells without detection": (existence, "SHOWN_TIME", 1e9),
     "false boxes last 0.15 s": (existence, "CLUTTER_TIME", 0.15),
     "nobody hides anybody": (kernels, "visible_shares", lambda boxes, *_: np.ones(len(boxes))),
-    "no second boxes": (track_management, "DOUBLES", 0.0),
+    "no second boxes": (tracked_people, "DOUBLES", 0.0),
     "sizes change on": (update_from_boxes, "SIZE_RATE_TIME", 1e9),
     "reported while they exist": (kernels, "reported", lambda boxes, bank, *more: REPORTED(boxes, bank * SURE, *more)),
 }

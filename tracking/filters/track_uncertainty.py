@@ -3,7 +3,7 @@
 Gonzalez et al. (2006, secs. 4.5, 5) manage tracks by sqrt|S|, S the innovation covariance (of measurement minus
 predicted place; eq. 6). It falls towards an asymptote while measurements are associated and rises while they are
 missed. It does not depend on measured values. This module computes rho and its thresholds;
-tracking.papers.blob.track_management starts, confirms and deletes tracks by them.
+tracking.papers.blob.tracked_people starts, confirms and deletes tracks by them.
 
 The paper prints no numbers. It confirms "below a certain percentage" of the asymptote; as rho falls towards 1 from
 above, the percentage is above 100. It deletes at the value that "a certain number" of misses gives. The value at birth

@@ -38,7 +38,8 @@ from tracking.episodes.parallel_episodes import EpisodeTask, opened_sources
 from tracking.episodes.sources import Source, sources
 from tracking.episodes.tuned_tracker import TunedTracker
 from tracking.running.detection_mode import input_kind
-from tracking.stress.axes import Axis, BreakingPoint, Frontier, breaking_point, frontier
+from tracking.stress.axes import Axis
+from tracking.stress.breaking_points import BreakingPoint, Frontier, breaking_point, frontier
 from tracking.stress.scene_player import ORACLE, OracleTask, PlayScenes, Store
 
 FIRST_VALUES = (5, 3)  # the second if the budget allows no two scenes at the first

@@ -13,7 +13,8 @@ from scenarios.loading.resolve import load
 from tracking.episodes.parallel_episodes import EpisodeTask
 from tracking.episodes.sources import Source
 from tracking.episodes.tuned_tracker import TunedTracker
-from tracking.stress.axes import AXES, NEVER, breaking_point, crossing, frontier, parse_axes, parse_axis, shares
+from tracking.stress.axes import AXES, parse_axes, parse_axis
+from tracking.stress.breaking_points import NEVER, breaking_point, crossing, frontier, shares
 from tracking.stress.scene_player import Outcome, Store, Tasks
 from tracking.stress.sweep import Plan, Sweep
 

@@ -20,7 +20,8 @@ from tracking.app.progress import ProgressMeter
 from tracking.app.score_tables import checked_key, figure, table
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.stats import FEWEST, few, mean_interval
-from tracking.stress.axes import Axis, BreakingPoint, parse_axes, shares
+from tracking.stress.axes import Axis, parse_axes
+from tracking.stress.breaking_points import BreakingPoint, shares
 from tracking.stress.scene_player import Store, contender, scene_player
 from tracking.stress.sweep import Plan, Sweep, generate_command, key_of
 from tracking.stress.worst_scenes import SearchedScene, search, worst

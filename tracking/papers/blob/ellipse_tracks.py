@@ -18,7 +18,7 @@ from tracking.detect.person_size import upright
 from tracking.filters import kalman, track_uncertainty
 from tracking.papers.blob import person_look_kernels
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.track_management import TrackedPeople
+from tracking.papers.blob.tracked_people import TrackedPeople
 
 ANGLE_RATE = 15.0  # deg/s^0.5, random walk of the direction: its standard deviation after one second
 RELAXATION = 0.5  # s, time constant with which axes return to the expected ones

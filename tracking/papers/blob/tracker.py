@@ -14,8 +14,8 @@ from sim.types import Context, Detections, Frame, Plane, Tracks
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import BlobConfig
-from tracking.papers.blob.track_management import TrackedPeople
-from tracking.papers.blob.track_management_kernels import image_covariance
+from tracking.papers.blob.tracked_people import TrackedPeople
+from tracking.papers.blob.tracked_people_kernels import image_covariance
 from tracking.papers.blob.update_from_boxes import BoxUpdater
 
 if TYPE_CHECKING:

@@ -1,8 +1,8 @@
 """One frame of `blob` from boxes: the cascade of Gonzalez et al. (2006) on a detector's boxes.
 
 Order of a frame, with the paper's sections: predict (sec. 4.2, eqs 1, 2), gate (sec. 4.3, eqs 8 to 10), associate (sec.
-4.4), update (sec. 4.2, eqs 3 to 7), update on the ground where a camera is known (ours; track_management), manage the
-tracks (secs. 4.5, 5, or by existence, ours; track_management). A measurement z is a centred box (x, y, h, w), px, with
+4.4), update (sec. 4.2, eqs 3 to 7), update on the ground where a camera is known (ours; tracked_people), manage the
+tracks (secs. 4.5, 5, or by existence, ours; tracked_people). A measurement z is a centred box (x, y, h, w), px, with
 a score from 0 to 1.
 """
 
@@ -15,7 +15,7 @@ from tracking.filters import kalman
 from tracking.filters.existence import ScoreCalibration
 from tracking.papers.blob import box_geometry
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
-from tracking.papers.blob.track_management import LEAST_EXISTENCE, TrackedPeople
+from tracking.papers.blob.tracked_people import LEAST_EXISTENCE, TrackedPeople
 from tracking.running import image_scale
 
 # s: time constant with which rates of height and width return to zero. Without it a missed person shrinks or grows on.

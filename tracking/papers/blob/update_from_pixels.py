@@ -7,10 +7,10 @@ Order of a frame, with the paper's sections:
     other foreground: split among the tracks expected there, by templates     ours (person_template)
     foreground that no track explains, as large as a person: new tracks       ours (person_template)
     update with the ellipses                                                  sec. 4.2, eqs 3 to 7
-    where a camera is known: update on the ground with their boxes            ours (track_management)
-    axes return towards those of a person at the track's place                ours (track_management)
+    where a camera is known: update on the ground with their boxes            ours (tracked_people)
+    axes return towards those of a person at the track's place                ours (tracked_people)
     looks: the colours of people, where nobody hides them, are learned        ours (person_look_kernels)
-    by existence (ours) or rho: confirm, delete, start tracks                 secs. 4.5, 5 (track_management)
+    by existence (ours) or rho: confirm, delete, start tracks                 secs. 4.5, 5 (tracked_people)
     adapt the background, except where confirmed tracks are                   ours
     learn the size of a person, and an unknown scale, from lone blobs         ours (detect.person_size)
 
@@ -35,7 +35,7 @@ from tracking.papers.blob import person_template_kernels as kernels
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.ellipse_tracks import TrackedEllipses
 from tracking.papers.blob.person_look_kernels import LEARN_SHOWN, LOOK_TIME
-from tracking.papers.blob.track_management_kernels import covered_shares
+from tracking.papers.blob.tracked_people_kernels import covered_shares
 from tracking.running import image_scale
 
 SIZE_TIME = 0.5  # s between pictures from which sizes are learned once enough is remembered: it must be of many people

@@ -10,7 +10,7 @@ from sim.types import Camera, Context
 from tracking.filters import kalman
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.ellipse_tracks import TrackedEllipses
-from tracking.papers.blob.track_management_kernels import visible_shares
+from tracking.papers.blob.tracked_people_kernels import visible_shares
 
 FPS, SCALE = 10.0, 40.0
 UP, LEVEL = np.pi / 2, 0.0

@@ -259,7 +259,7 @@ def test_reports_on_the_ground_where_the_camera_is_known(camera, high):
 def test_places_on_the_ground_are_steadier_than_feet_of_boxes():
     from sim.scene.standing import standing_points
     from tracking.papers.blob import box_geometry
-    from tracking.papers.blob.track_management import seen_boxes
+    from tracking.papers.blob.tracked_people import seen_boxes
 
     camera, r = pinhole(4.0, at=(0.0, 0.0, 1.2)), np.random.default_rng(30_000)
     path = np.array([[-2 + 0.1 * k, 12 + 0.03 * k, 0, 0, 1.8] for k in range(60)])

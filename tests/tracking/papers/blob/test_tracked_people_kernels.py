@@ -7,7 +7,7 @@ import pytest
 from scipy.special import erf
 
 from tracking.filters import existence, kalman
-from tracking.papers.blob import track_management_kernels as kernels
+from tracking.papers.blob import tracked_people_kernels as kernels
 
 VIEW = np.array([[0.0, 0.0], [300.0, 200.0]])
 

@@ -30,7 +30,7 @@ from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Camera, Context, Ints
 from tracking.filters import assignment, existence, kalman, kalman_kernels, track_uncertainty
 from tracking.papers.blob import box_geometry
-from tracking.papers.blob import track_management_kernels as kernels
+from tracking.papers.blob import tracked_people_kernels as kernels
 from tracking.papers.blob.config import BlobConfig
 
 # Relative margin of rho, with which deletion comes earlier, so that filters near their steady state count as in it.

@@ -1,4 +1,4 @@
-"""Kernels of track_management: who hides whom, costs of pairs, second boxes of people, and who is reported.
+"""Kernels of tracked_people: who hides whom, costs of pairs, second boxes of people, and who is reported.
 
 Boxes are centred: centre x, y, height, width, px. bank (5, N, 4): Kalman filters (tracking.filters.kalman). The loops
 over all pairs need no table of the pairs.
