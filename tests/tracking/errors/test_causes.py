@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracking.errors.causes import Facts, cause_of_person
+from tracking.errors.causes import Facts, cause_of_group, cause_of_person
+from tracking.errors.groups import GroupError
 from tracking.errors.people import PersonError
 
 FRAMES, FPS = 20, 10.0
@@ -45,3 +46,18 @@ def test_another_person_is_near_within_80_cm(distance: float, name: str) -> None
     of = facts({1: (0.0, 0.0), 2: (distance, 0.0)}, boxes, hidden=0)
     cause = cause_of_person(PersonError("switch", 10, 10, (), 1), of)
     assert cause.name == name
+
+
+@pytest.mark.parametrize(("distance", "name"), [(1.8, "tracker"), (2.2, "apart")])
+def test_the_middle_frame_says_whether_a_pair_is_apart(distance: float, name: str) -> None:
+    boxes = dict.fromkeys((1, 2), (100, 50, 40, 100))
+    of = facts({1: (0.0, 0.0), 2: (0.5, 0.0)}, boxes, hidden=0)
+    of.pos[(of.id == 2) & (of.frame == 10)] = distance, 0.0
+    assert cause_of_group(GroupError("missed group", 5, 15, 1, (1, 2)), of).name == name
+
+
+@pytest.mark.parametrize(("distance", "name"), [(1.4, "beside"), (1.6, "tracker")])
+def test_strangers_are_beside_a_group_within_a_metre_and_a_half(distance: float, name: str) -> None:
+    boxes = dict.fromkeys((1, 2, 3), (100, 50, 40, 100))
+    of = facts({1: (0.0, 0.0), 2: (0.5, 0.0), 3: (0.5 + distance, 0.0)}, boxes, hidden=0)
+    assert cause_of_group(GroupError("strangers joined", 5, 15, 1, (1, 2), (3,)), of).name == name
