@@ -1,6 +1,6 @@
 """Mutants: small changes of the mathematics and the decisions, one at a time, which the fast tests must see.
 
-    python -m benchmarks mutants [--count 300] [--seed 1] [--only tracking.filters …] [--jobs 2] [--seconds 45]
+    python -m benchmarks mutants [--count 300] [--seed 1] [--only tracking.filters …] [--jobs 2] [--seconds 30]
 
 Draws --count mutants of all that the operators of cosmic-ray make of the modules in ROOMS: comparisons, arithmetic,
 numbers, `and` and `or`, `not`, loops that end at once. Changes that cannot change a result are not drawn: annotations,
@@ -221,7 +221,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1, help="of the draw")
     parser.add_argument("--only", nargs="+", default=ROOMS, help="dotted names of rooms or modules")
     parser.add_argument("--jobs", type=int, default=2, help="processes")
-    parser.add_argument("--seconds", type=float, default=45.0, help="CPU time of the tests of a mutant")
+    parser.add_argument("--seconds", type=float, default=30.0, help="CPU time of the tests of a mutant")
     parser.add_argument("--out", type=Path, default=ROOT / "build" / "mutants.jsonl", help="file of the verdicts")
     parser.add_argument("--again", action="store_true", help="plays the survivors in --out again")
     given: argparse.Namespace = parser.parse_args()

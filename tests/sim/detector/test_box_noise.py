@@ -3,8 +3,9 @@ import pytest
 from scipy.stats import norm, t
 
 from scenarios.schema.sensor import BoxNoise, Memory
-from sim.detector.box_noise import box_errors, heavy_tailed, perturb_boxes
+from sim.detector.box_noise import box_errors, heavy_tailed, perturb_boxes, seen_shift
 from sim.detector.draws import correlated_normals
+from sim.detector.visible_ground import furthest_row
 from sim.scene.camera import foot_points, project
 from tests.reference_sense import above, pinhole
 
@@ -75,3 +76,17 @@ def test_correlation_is_the_sum_of_the_parts() -> None:
     for lag in (1, 3, 10, 30):
         wanted = sum(m.share * np.exp(-lag / (10 * m.time)) for m in memory)
         assert (z[:, lag:] * z[:, :-lag]).mean() == pytest.approx(wanted, abs=0.025)
+
+
+def test_hidden_feet_shift_a_person_away_from_the_camera_as_far_as_people_can_be_seen() -> None:
+    """Nothing is hidden; the feet; all but a head above the horizon."""
+    camera = pinhole(10.0)
+    whole = np.tile([300.0, 100.0, 40.0, 200.0], (3, 1))
+    seen = np.array([[300.0, 100.0, 40.0, height] for height in (200.0, 170.0, 20.0)])
+    shift = seen_shift(seen, whole, np.zeros(3), camera)
+    lower = np.array([300.0, 270.0, furthest_row(camera)])
+    assert lower[2] > 120
+    expected = foot_points(np.column_stack([whole[:, :3], lower - 100.0]), np.zeros(3), camera)
+    np.testing.assert_allclose(shift, expected - foot_points(whole, np.zeros(3), camera), atol=1e-9)
+    assert shift[0].tolist() == [0.0, 0.0]
+    assert (np.diff(shift[:, 1]) > 0).all()

@@ -5,7 +5,7 @@ from sim.scene.body import ellipsoids, person_boxes
 from sim.scene.camera import rays
 from sim.scene.visibility import BodyVisibility, measure_visibility
 from sim.scene.visibility_kernels import COLUMNS, visible_span
-from sim.types import Array, Camera, Scene
+from sim.types import Array, Camera, Scene, Stairs
 from tests import reference_render as slow
 from tests.reference_sense import pinhole
 
@@ -84,6 +84,14 @@ def test_a_door_is_an_opening() -> None:
     scene = Scene(np.array([16.0, 10.0]), walls=halves, wall_height=30.0)
     through, beside = see(pinhole(), scene, np.array([[8.0, 4.0], [6.0, 4.0]])).visibility
     assert (through, beside) == (1.0, 0.0)
+
+
+def test_stairs_hide_who_is_behind_them_and_not_who_is_before_or_beside() -> None:
+    """They rise to 3 m between y = 0 and y = 2, before a camera at 1.6 m."""
+    stairs = Stairs(np.array([8.0, 0.0]), np.array([8.0, 2.0]), 3.0, 3.0, 6)
+    scene, camera = Scene(np.array([16.0, 10.0]), stairs=(stairs,)), pinhole(10, 0, (8, -6, 1.6))
+    found = see(camera, scene, np.array([[8.0, 4.0], [8.0, -1.5], [11.0, 4.0]])).visibility
+    assert found == pytest.approx([0.0, 1.0, 1.0])
 
 
 def test_the_image_cuts_people() -> None:

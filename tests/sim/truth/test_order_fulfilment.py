@@ -71,6 +71,7 @@ def test_the_wrong_kind_or_the_wrong_people_do_not_count() -> None:
     with pytest.raises(WorkError):
         check(motion, truth_of(motion, 50, to=(1, 1, -1)))
     assert check(motion, truth_of(motion, 50, kind="form")) == {"m1": 0}
+    assert check(motion, truth_of(motion, 50, to=(0, 0, 0))) == {"m1": 0}, "0 is the id of a group"
 
 
 def test_an_order_that_never_fired() -> None:

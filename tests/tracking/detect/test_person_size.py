@@ -8,7 +8,7 @@ import pytest
 from sim.scene.camera import camera_rotation, project
 from sim.types import Camera, Context
 from tracking.detect import typical_person
-from tracking.detect.person_size import ENOUGH, PersonSize
+from tracking.detect.person_size import CLEANED_AWAY, ENOUGH, PersonSize
 
 BARE = Context(10.0, float("nan"), image_size=(480, 360))
 
@@ -70,6 +70,12 @@ def test_with_a_camera_a_tenth_of_the_height_is_learned(seen, learned):
     box = np.column_stack([foot[:, 0] - w / 2, foot[:, 1] - seen * h, w, seen * h])
     size.learn(box, ellipses(box), np.ones(60, bool))
     assert size.at(foot)[:, 0] == pytest.approx(learned * h, rel=0.03)
+
+
+def test_what_cleaning_removes_at_the_head_is_added():
+    box, size = blobs(np.random.default_rng(0), 60, level=20.0, slope=0.0, noise=0.0), PersonSize(BARE)
+    size.learn(box, ellipses(box), np.ones(60, bool))
+    assert size.at(np.array([[240.0, 180.0]]))[0, 0] == pytest.approx(20 + CLEANED_AWAY, abs=0.1)
 
 
 @pytest.mark.parametrize(("level", "learned"), [(24.0, True), (10.0, False)])

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tests import reference_components as reference
 from tracking.filters.components import Constraint, linked, partition
-from tracking.filters.components_kernels import prefixes
+from tracking.filters.components_kernels import FEW, prefixes
 
 LINK = 1.5
 RULE = Constraint(LINK, 9.21, 0.09 * np.eye(2), 3.0)
@@ -51,6 +52,16 @@ def test_partitions_of_random_sets() -> None:
         joined += group.max() < label.max()
         noise += group.min() < 0
     assert min(joined, noise) > 15
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_many_components_are_joined_alike_wherever_they_are(seed: int) -> None:
+    r = np.random.default_rng(seed)
+    points, weights, rule = r.uniform(0, 25, (90, 2)), np.ones(90), random_set(r)[2]
+    here = partition(points, weights, rule)
+    assert len({*linked(points, rule.link)}) > FEW
+    assert np.array_equal(here, reference.partition(points, weights, rule))
+    assert np.array_equal(here, partition(points + np.array([1e4, -1e4]), weights, rule))
 
 
 def test_nobody_one_and_all_at_the_same_place() -> None:

@@ -9,10 +9,13 @@ import pytest
 
 from scenarios.errors import WorkError
 from scenarios.loading.resolve import load
+from sim.scene.body import PERSON_HEIGHT
+from sim.scene.camera import project
 from sim.sequence import simulate
-from sim.types import Detections, Frame, Sequence, Tracks
+from sim.types import Context, Detections, Frame, Sequence, Tracks
+from tests.reference_sense import pinhole
 from tests.tracking.running.test_run import Stranger
-from tracking.running.plane_check import COMPARED
+from tracking.running.plane_check import COMPARED, PlaneCheck
 from tracking.running.run import track
 from tracking.scoring import evaluate
 
@@ -161,3 +164,20 @@ def test_a_plane_that_is_wrong_from_a_later_frame_on_ends_the_run(scene: Sequenc
 
     with pytest.raises(WorkError, match=r"frame 20.*expected people in m"):
         track(Later(), scene, detections="file")
+
+
+@pytest.mark.parametrize("fits", [True, False])
+def test_positions_in_the_image_are_compared_with_the_middles_of_bodies(fits: bool) -> None:
+    camera, check = pinhole(), PlaneCheck()
+    points = np.column_stack([np.linspace(4, 12, COMPARED), np.full(COMPARED, 3.0)])
+    middle, _ = project(camera, np.column_stack([points, np.full(COMPARED, PERSON_HEIGHT / 2)]))
+    pos = middle - np.array([0.0, 60.0 if fits else 150.0])  # a person is 76 px high
+    given = Detections(1, 0.0, "ground", points, None, None, np.ones(COMPARED))
+    none, zero, cov = np.full(COMPARED, -1), np.zeros((COMPARED, 2)), np.zeros((COMPARED, 4, 4))
+    t = Tracks(1, 0.0, "image", "person", np.arange(COMPARED), none, pos, zero, cov, None, np.ones(COMPARED))
+    if fits:
+        check.check(t, given, Context(10.0, 45.0, camera), "mine", "made")
+        assert check.fitting == COMPARED
+    else:
+        with pytest.raises(WorkError, match="made, frame 1"):
+            check.check(t, given, Context(10.0, 45.0, camera), "mine", "made")

@@ -15,7 +15,7 @@ from tracking.episodes.parallel_episodes import EpisodeTask
 from tracking.stress.axes import parse_axes
 from tracking.stress.scene_player import Outcome, Tasks
 from tracking.stress.sweep import Sweep
-from tracking.stress.worst_scenes import NEAR, SearchedScene, search, worst
+from tracking.stress.worst_scenes import NEAR, RANDOM, SearchedScene, search, worst
 
 HOLES = {"cross": (0.5, 4.0), "pass-by": (0.9, 1.0)}  # by scenario, detection and clutter where the tracker is worst
 
@@ -47,6 +47,12 @@ def test_both_holes_are_found(tmp_path: Path) -> None:
     assert [failure.shortfall for failure in found] == sorted((f.shortfall for f in found), reverse=True)
     for k, one in enumerate(found):
         assert not any(one.nearness(other) for other in found[:k])
+
+
+def test_after_random_scenes_some_of_four_are_sampled(tmp_path: Path) -> None:
+    found = search(sweep(tmp_path, []), RANDOM + 32)
+    assert not any(one.sampled for one in found[:RANDOM])
+    assert 8 <= sum(one.sampled for one in found[RANDOM:]) <= 24
 
 
 def test_failures_near_worse_ones_are_not_listed(tmp_path: Path) -> None:

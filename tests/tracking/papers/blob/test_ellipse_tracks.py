@@ -69,3 +69,13 @@ def test_from_straight_above_nobody_is_behind_anybody():
     one.start_tracks(np.array([[100.0, 100, 12, 8, UP], [100, 106, 12, 12, UP]]), np.ones(2), 0.0, np.ones(2))
     one.predict()
     assert one.detectable.tolist() == [settings.detect_prob] * 2
+
+
+def test_axes_return_to_the_expected_ones_with_a_time_constant():
+    """After 0.5 s, in five steps, the difference has shrunk to 1 / e; without measurements so has that of variances."""
+    one = people([100, 100, 68, 24, UP])
+    one.bank[kalman.VAR, 0, 2:] = 9.0
+    for _ in range(5):
+        one.relax_axes(np.array([0]), np.array([[60.0, 20.0]]), 4.0)
+    assert one.bank[kalman.PLACE, 0, 2:] == pytest.approx([60 + 8 / np.e, 20 + 4 / np.e])
+    assert one.bank[kalman.VAR, 0, 2:] == pytest.approx(np.full(2, 4 + 5 / np.e**2))

@@ -74,3 +74,16 @@ def test_what_is_explained_brings_nobody():
     for explained in (1, EXPLAINED):
         cover = slow.painted((HIGH, WIDE), one).astype(np.int16) * np.int16(explained)
         assert not len(person_template.find_new_people(mask_of(one[0]), cover, Fixed(60.0, 24.0), 0.5))
+
+
+def test_people_are_of_the_size_that_they_have_where_they_stand():
+    class Leaning:
+        above = False
+
+        def at(self, foot):
+            h = np.where(foot[:, 0] < 50, 80.0, 30.0)
+            return np.stack([h, 0.4 * h], axis=1)
+
+    cover = np.zeros((HIGH, WIDE), np.int16)
+    found = person_template.find_new_people(mask_of([100.0, 70.0, 30.0, 12.0]), cover, Leaning(), 0.5)
+    np.testing.assert_allclose(found, [[100, 70, 30, 12]], atol=2)

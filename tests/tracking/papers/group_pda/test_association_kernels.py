@@ -330,3 +330,17 @@ def test_masses_are_densities():
     assert log_density(*at, S[[0, 0, 1], [0, 1, 1]]) == pytest.approx(multivariate_normal([0, 0], S).logpdf(at))
     tail = NEWCOMERS * 6 / (6 + 4) ** 2
     assert np.exp(log_count(4.0, 5.0, 2.0)) == pytest.approx(tail + (1 - NEWCOMERS) * norm(5, np.sqrt(2)).pdf(4))
+
+
+@pytest.mark.parametrize("scale", [0.1, 1.0, 30.0])
+def test_distances_are_known_within_the_search_region(scale):
+    r = np.random.default_rng(0)
+    region, x = np.array([positive(r, 2, scale) for _ in range(4)]), scale * r.normal(size=(4, 4))
+    points = r.normal(0, 3 * scale, (200, 2))
+    d2 = np.array([
+        [(p - mean[:2]) @ np.linalg.inv(cov) @ (p - mean[:2]) for p in points]
+        for mean, cov in zip(x, region, strict=True)
+    ])  # fmt: skip
+    expected = np.where(d2 < 9.21, d2, np.inf)
+    assert 50 < np.isfinite(expected).sum() < 750
+    np.testing.assert_allclose(kernels.search(points, x, region, 9.21), expected, rtol=1e-9)

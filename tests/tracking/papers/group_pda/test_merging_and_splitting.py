@@ -50,3 +50,13 @@ def test_who_was_there_for_less_than_2_s_was_never_one_group(since: float, split
     events = [e for k in range(10) for e in changes.step(two, scaled, k / FPS)]
     split = ("split", pytest.approx(0.4 - 0.7 / 0.7), (0,), (0, 1))
     assert [(e.kind, e.onset, e.before, e.after) for e in events] == splits * [split]
+
+
+def test_in_the_paper_groups_merge_whose_places_and_velocities_overlap() -> None:
+    """Three at one place, of which the second has another velocity."""
+    scaled = scale_parameters(GroupPdaConfig(corrections=False), FPS, 1.0)
+    x = np.array([[0.0, 0.0, 9.0, 0.0], [0.1, 0.0, 0.0, 0.0], [0.0, 0.1, 9.0, 0.0]])
+    three = bank(size=np.ones(3), x=x, extent=np.tile(0.1 * np.eye(2), (3, 1, 1)), first_seen=np.full(3, -9.0))
+    three.last_seen[:] = 0.0
+    (merge,) = GroupChanges().step(three, scaled, 0.0)
+    assert (merge.kind, merge.before, merge.after) == ("merge", (0, 2), (0,))
