@@ -88,7 +88,8 @@ def speed() -> str:
     )
     return (
         f"- **Speed**: the simulator makes {min(ratios)} to {max(ratios)} times as many steps a CPU second as"
-        f" JuPedSim, with {simulated[0]['people']} to {simulated[-1]['people']} people; HOTA, CLEAR and Identity equal TrackEval's and"
+        f" JuPedSim, with {simulated[0]['people']} to {simulated[-1]['people']} people;"
+        " HOTA, CLEAR and Identity equal TrackEval's and"
         f" take a {number(faster, 0)}th of its time ([table](docs/results/cost.md))."
     )
 

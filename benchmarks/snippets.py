@@ -17,12 +17,15 @@ ROOT = Path(__file__).resolve().parents[1]
 NAMED = r"(?:Save this as `(?P<name>\w+\.py)`[^`]*(?:`\w+`[^`]*)*?\n+)?"
 BLOCK = re.compile(NAMED + r"^```python\n(?P<code>.*?)^```", re.M | re.S)
 
+MADE = re.compile(r"<!-- generated: .*?<!-- end -->", re.S)  # signatures
+
 
 def snippets() -> dict[str, str]:
     """Returns the code of every block by the name of its file."""
     found = {}
     for page in (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))):
-        for k, block in enumerate(BLOCK.finditer(page.read_text(encoding="utf-8"))):
+        text = MADE.sub("", page.read_text(encoding="utf-8"))
+        for k, block in enumerate(BLOCK.finditer(text)):
             found[block["name"] or f"{page.stem.replace('-', '_').lower()}_{k}.py"] = block["code"]
     return found
 
