@@ -18,7 +18,8 @@ Failures: mean number of such scenes. Scenarios: mean number of scenarios among 
 
 story: the same for a tracker that loses 0.5 where two groups cross while the brightness changes by more than a tenth
 within a second; axes: the time at which the light is switched to 0.7, noise and blur of pictures; seeds on which
-nothing was tuned. The worst failures are minimised with 5 confirming seeds, and the smallest scenes are played on 5 fresh ones.
+nothing was tuned. The worst failures are minimised with 5 confirming seeds, and the smallest scenes are played on 5
+fresh ones.
 """
 
 from __future__ import annotations
