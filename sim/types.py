@@ -480,7 +480,7 @@ class Tracker(Protocol):
     """The interface of a tracker. needs: one or more of "pixels" (pictures), "stereo" (left and right pictures),
     "boxes" and "points" (detections). The tracker can work with each of these inputs alone."""
 
-    needs: tuple[str, ...]
+    needs: Any  # tuple[str, ...]; Any, so that a class need not say so
 
     def reset(self, context: Context, seed: int) -> None:
         """Forgets all state and prepares for a new sequence. seed: for the tracker's random numbers."""

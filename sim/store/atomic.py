@@ -2,8 +2,8 @@
 
 What is written gets a temporary name, then the name of its target. An OSError becomes a WorkError if the disk is full,
 else an InputError. Killed runs leave files with names .partial-…-<12 hex digits>, which `remove_partials` deletes. A
-power failure may damage files; their hashes in the seals tell. A lock on an output folder makes a second command on
-this machine fail at once.
+power failure may damage files; their hashes in the seals tell. A lock on an output folder makes a second command fail
+at once. On Windows and on file systems without such locks, nothing is locked.
 """
 
 from __future__ import annotations
@@ -12,17 +12,18 @@ import errno
 import os
 import re
 import shutil
-import tempfile
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from contextvars import ContextVar
-from hashlib import sha256
 from pathlib import Path
 from uuid import uuid4
 
-from filelock import FileLock, Timeout
-
 from scenarios.errors import FlockscopeError, InputError, WorkError
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 # folders whose lock an enclosing block of this thread holds
 _held: ContextVar[frozenset[Path]] = ContextVar("held", default=frozenset())
@@ -32,34 +33,46 @@ _held: ContextVar[frozenset[Path]] = ContextVar("held", default=frozenset())
 def lock_folder(root: Path, held: bool = False) -> Iterator[None]:
     """Creates the folder `root` and locks it while the block runs.
 
-    Raises InputError at once if another command or thread of this machine holds the lock. held: True allows the block
-    to stand inside another block of the same thread for the same folder; the inner block then changes nothing.
+    Raises InputError at once if another command or thread holds the lock. held: True allows the block to stand inside
+    another block of the same thread for the same folder; the inner block then changes nothing.
     """
-    place = root.resolve()
-    if held and place in _held.get():
+    if held and root.resolve() in _held.get():
         yield
         return
     made = _absent(root)
     try:
-        with FileLock(_lock_file(place), blocking=False):
-            root.mkdir(parents=True, exist_ok=True)
-            token = _held.set(_held.get() | {place})
-            try:
-                yield
-            finally:
-                _held.reset(token)
-                _remove_empty(made)
-    except Timeout:
-        got, remedy = "another run that writes here", "wait, or choose another --out"
-        raise InputError(file=root, got=got, expected="one at a time", remedy=remedy) from None
+        descriptor = _locked(root)
+        token = _held.set(_held.get() | {root.resolve()})
+        try:
+            yield
+        finally:
+            _held.reset(token)
+            _remove_empty(made)  # only who holds the lock may remove what others would lock
+            os.close(descriptor)
     except OSError as error:
         raise write_error(root, error) from error
 
 
-def _lock_file(place: Path) -> Path:
-    """Returns the file that is locked for a folder: among the temporary files, so that datasets hold none."""
-    user = os.getuid() if hasattr(os, "getuid") else ""
-    return Path(tempfile.gettempdir(), f"flockscope-{user}-{sha256(os.fsencode(place)).hexdigest()[:24]}.lock")
+def _locked(root: Path) -> int:
+    while True:
+        root.mkdir(parents=True, exist_ok=True)
+        if fcntl is None:
+            return os.open(os.devnull, os.O_RDONLY)
+        with suppress(FileNotFoundError):  # removed by who held its lock
+            descriptor = os.open(root, os.O_RDONLY)
+            try:
+                fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                os.close(descriptor)
+                got, remedy = "another run that writes here", "wait, or choose another --out"
+                raise InputError(file=root, got=got, expected="one at a time", remedy=remedy) from None
+            except OSError:  # NFS cannot lock folders
+                return descriptor
+            # Another folder may stand at the path now, or none.
+            with suppress(FileNotFoundError):
+                if os.path.samestat(os.fstat(descriptor), os.stat(root)):
+                    return descriptor
+            os.close(descriptor)
 
 
 def _absent(folder: Path) -> list[Path]:

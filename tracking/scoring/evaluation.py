@@ -203,7 +203,7 @@ def evaluate(
 
     Raises:
         IncomparableError: boxes or positions to be compared are missing.
-        ValueError: an id occurs twice in one frame.
+        ValueError: an id occurs twice in one frame, two `Tracks` are of one frame, or `frames` chooses none.
         InputError: `truth` is None, or groups must be derived in the image and `truth.px_per_m` is 0 or less.
     """
     if truth is None:
@@ -291,6 +291,8 @@ def chosen_frames(frames: int | range | None, length: int) -> Bools:
         inside[[f for f in frames if 1 <= f <= length]] = True
     else:
         inside[1 : 1 + (length if frames is None else max(frames, 0))] = True
+    if frames is not None and length and not inside.any():
+        raise ValueError(f"frames: got {frames}, expected some of 1 to {length}")
     return inside
 
 
@@ -305,7 +307,10 @@ def labelled_frames(truth: Truth) -> Bools:
 def _in_order(tracks: Iterable[Tracks], inside: Bools) -> list[Tracks]:
     # later frames must not influence the scores; earlier ones do, as groups are derived from them
     last = int(np.flatnonzero(inside)[-1]) if inside.any() else 0
-    by_frame = {t.index: t for t in tracks if 1 <= t.index <= last}
+    given = [t for t in tracks if 1 <= t.index <= last]
+    by_frame = {t.index: t for t in given}
+    if len(by_frame) < len(given):
+        raise ValueError("tracks: got two Tracks of one frame, expected one of each frame")
     return [by_frame[index] for index in sorted(by_frame)]
 
 

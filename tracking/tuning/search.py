@@ -89,8 +89,9 @@ def _search(options: TuneOptions) -> TuningResult:
 
 
 def require_optuna(place: str) -> None:
-    """Raises InputError if Optuna is missing; place: what needs them."""
+    """Raises InputError if Optuna or filelock is missing; place: what needs them."""
     with extra_needed("tune", place):
+        import filelock  # noqa: F401
         import optuna  # noqa: F401
 
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
+from contextlib import ExitStack
 from pathlib import Path
 
 import cv2
@@ -102,17 +104,23 @@ def test_videos(tmp_path, comment):
     assert own_files.is_ours(tmp_path / "x.mp4") is (comment == own_files.GENERATOR)
 
 
-def test_a_folder_that_another_locks_stays_and_an_empty_one_goes(tmp_path):
-    root = tmp_path / "a/out"
-    with lock_folder(root):
+@pytest.mark.parametrize("step", ["mkdir", "flock"])
+def test_nobody_removes_or_replaces_a_folder_that_another_locks(tmp_path, monkeypatch, step):
+    """The other comes between two steps of the first: before its mkdir, or between its open and its flock."""
+    root, stack, place = tmp_path / "a/out", ExitStack(), {"mkdir": Path, "flock": fcntl}[step]
+    original = getattr(place, step)
+
+    def late(*given, **more):
+        monkeypatch.undo()
+        if step == "flock":
+            root.rmdir()
+        stack.enter_context(lock_folder(root))
+        return original(*given, **more)
+
+    monkeypatch.setattr(place, step, late)
+    with stack:
         for _ in range(2):
             with pytest.raises(InputError, match="another run"), lock_folder(root):
                 pass
         assert root.is_dir()
-        with lock_folder(root, held=True):
-            assert list(root.iterdir()) == []
-    assert not root.parent.exists()
-    for _ in range(2):
-        with lock_folder(root):
-            (root / "file").touch()
-    assert root.is_dir()
+    assert not root.exists()

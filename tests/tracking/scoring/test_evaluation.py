@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import scenarios
+from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import EVENT_KINDS, Tracks, Truth
@@ -157,3 +158,15 @@ def test_the_objective_alone_is_that_of_all_scores(name: str) -> None:
             found, expected = compared.objective_scores(), compared.scores("hull")
             assert found == pytest.approx({key: expected[key] for key in found}, abs=1e-12, nan_ok=True)
             assert list(found) == ["HOTA", "group_F1", "objective"]
+
+
+def test_what_cannot_be_scored_is_refused():
+    true = truth([Scene(TWO, {1: ((1, 2), None)})] * 3)
+    told = truth_as_tracks(true)
+    with pytest.raises(ValueError, match="two Tracks of one frame"):
+        evaluate(true, [*told, told[0]])
+    for none in (0, range(0), range(4, 9)):
+        with pytest.raises(ValueError, match="expected some of 1 to 3"):
+            evaluate(true, told, frames=none)
+    with pytest.raises(InputError, match="expected labels"):
+        evaluate(None, told)

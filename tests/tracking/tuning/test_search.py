@@ -195,9 +195,10 @@ def test_an_error_of_the_defaults_is_raised(tmp_path):
         tune(**tune_arguments(tmp_path, tracker=f"{broken}:Toy"))
 
 
-def test_without_optuna_one_line_says_what_to_install(tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "optuna", None)
-    with pytest.raises(InputError, match=r'no package optuna.*pip install .* -e "\.\[tune\]"'):
+@pytest.mark.parametrize("package", ["optuna", "filelock"])
+def test_without_a_package_one_line_says_what_to_install(tmp_path, monkeypatch, package):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(InputError, match=rf'no package {package}.*pip install .* -e "\.\[tune\]"'):
         tune(**tune_arguments(tmp_path))
 
 

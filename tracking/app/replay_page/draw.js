@@ -187,11 +187,11 @@ function drawPanes(canvas, count, aspect, draw) {
   for (let k = 0; k < count; k++) draw(k, ctx, down ? 0 : k * w, down ? k * h : 0, w, h);
 }
 
-// The latest errors of a side that are shown at a frame, each at least for a second; at most two.
+// The dearest errors of a side that are shown at a frame, each at least for a second; at most two.
 function errorsAt(side, frame) {
   return data.errors
     .filter(error => error.side === side.name && error.start <= frame && frame <= Math.max(error.end, error.start + data.fps))
-    .sort((a, b) => b.start - a.start).slice(0, 2);
+    .sort((a, b) => (b.cost || 0) - (a.cost || 0) || b.start - a.start).slice(0, 2);
 }
 
 // Draws a line round the people, or the ghost, of each error of the shown tracks. reach: the points in px of [side, row]
