@@ -153,6 +153,7 @@ def test_commands_of_the_readme(tmp_path, monkeypatch, capsys):
     """In their order, in an empty folder."""
     monkeypatch.chdir(tmp_path)
     write_video(tmp_path / "street.mp4", [picture(k) for k in range(110)])
+    (tmp_path / "walks.csv").write_text("".join(f"{k},{p},{k / 10},{p}\n" for k in range(1, 111) for p in (1, 2)))
     (tmp_path / "det.txt").write_text("".join(f"{k},-1,{k / 2},20,16,40,0.9\n" for k in range(1, 111)))
     lines = [line for block in blocks("") for line in block.splitlines() if line.startswith("flockscope ")]
     assert len(lines) >= 6
@@ -165,7 +166,7 @@ def test_commands_of_the_readme(tmp_path, monkeypatch, capsys):
             capsys.readouterr().err,
         )
     assert (tmp_path / "plan.svg").is_file()
-    assert (tmp_path / "replay.html").is_file()
+    assert (tmp_path / "report" / "index.html").is_file()
 
 
 @pytest.mark.slow
