@@ -73,8 +73,8 @@ def labels_hash(truth: Truth) -> str:
     """Returns the SHA-256 (64 hex digits) of a recording's labels as read: frame rate, length, and of each row frame,
     id, group, position and box.
 
-    Nothing else counts: not the name, the image scale (an option), visibility or events, nor what is computed from the
-    labels (velocities, hulls).
+    Nothing else counts: not the name, visibility or events, nor what is computed from the labels (velocities, hulls).
+    The image scale counts only where it turned positions in px into m.
     """
     read = (truth.frame, truth.id, truth.group, truth.pos, truth.box)
     return canonical_hash(("labels", truth.fps, truth.length, *read))

@@ -1,4 +1,4 @@
-"""Reads and writes scenario files as plain tables: where they lie, TOML, `extends`, and how two tables are merged.
+"""Reads and writes scenario files as plain tables: where they lie, TOML, `extends`, and `--set`.
 
 A file with `extends = "base.toml"` (relative to itself, else in the catalogue) is merged over its base:
 
@@ -9,14 +9,11 @@ A file with `extends = "base.toml"` (relative to itself, else in the catalogue) 
 - any other value replaces the value of the base;
 - `name` is not inherited: without one, a scenario has the name of its own file.
 
-`--set key=value` (scenarios.loading.toml_files) differs: it replaces the value of the key, also where that is a table.
-
-Applies `--set key=value` to a scenario's table: `camera.fps=25`, `group.a.size=3`, `group.0.size`,
-`world.size.0=20`.
-
-A step into an array is an index from 0 or an `id`. Values are TOML (`3`, `[8, 5]`, `{ uniform = [0, 5] }`, `"top"`); a
-word without quotes is a string. The value replaces that of the key, also where it is a table; a table that replaces a
-row of an array keeps the row's id. A table set on a new id (`group.x={ size = 2, … }`) is appended to the array.
+`--set key=value` changes such a table: `camera.fps=25`, `group.a.size=3`, `group.0.size`, `world.size.0=20`. It differs
+from merging, as it replaces the value of the key, also where that is a table. A step into an array is an index from 0
+or an `id`. Values are TOML (`3`, `[8, 5]`, `{ uniform = [0, 5] }`, `"top"`); a word without quotes is a string. A table
+that replaces a row of an array keeps the row's id. A table set on a new id (`group.x={ size = 2, … }`) is appended to
+the array.
 """
 
 from __future__ import annotations

@@ -3,13 +3,13 @@
 Everything is drawn as uniforms; all other numbers are quantiles at them. A changed setting therefore leaves all draws
 as they were.
 
-Normal draws that stay correlated over time: sums of stationary AR(1) processes and of white noise.
-
-A part has a share s of the variance and a time constant tau in s. It is a process in time, not in frames: it runs on a
-clock of CLOCK ticks per s, and a frame takes the nearest tick. At tick k it adds sqrt(s) x_k, where x_k = rho x_(k-1) +
-sqrt(1 - rho²) e_k, e_k is a new standard normal, and rho = exp(-1 / (CLOCK tau)). The sum of all parts is N(0, 1); its
-autocorrelation at a lag in s is the sum of s exp(-lag / tau). The rest of the variance is white, that is independent in
-each frame. Every process begins in frame 1, so that the draws of a frame do not depend on when a person enters.
+Normals that stay correlated over time are sums of parts: stationary AR(1) processes and white noise. A part has a
+share w of the variance and a time constant tau in s. It is a process in time, not in frames: it runs on a clock of
+CLOCK ticks per s, and a frame takes the nearest tick. At tick k it adds sqrt(w) x_k, where x_k = rho x_(k-1) +
+sqrt(1 - rho²) e_k, e_k is a new standard normal, and rho = exp(-1 / (CLOCK tau)). The rest of the variance is white,
+that is independent in each frame. Parts and rest together are N(0, 1); at a lag above 0, in s, their autocorrelation is
+the sum of w exp(-lag / tau). Every process begins in frame 1, so that the draws of a frame do not depend on when a
+person enters.
 """
 
 from __future__ import annotations

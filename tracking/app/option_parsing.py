@@ -26,13 +26,13 @@ def split_label(text: str) -> tuple[str, str]:
     """Returns label and rest of a run or tracker "LABEL=rest"; the label is "" if the text has none.
 
     A text that is a path, or a class of a file ("path.py:Class"), has no label: what exists comes first. Nor has a text
-    with a slash before its "=". Raises InputError for a label without a rest, or one that stands for the oracle.
+    with a slash before its "=". Raises InputError for an empty label or rest, or a label whose first word is oracle.
     """
     label, equals, rest = text.partition("=")
     exists = Path(text).exists() or (".py:" in text and Path(text.rpartition(":")[0]).exists())
     if exists or not equals or "/" in label:
         return "", text
-    if not label or not rest or label.split()[0] == "oracle":
+    if not label.strip() or not rest or label.split()[0] == "oracle":
         expected = "LABEL=RUN, with a label that is not the oracle's"
         raise InputError(place="label", got=repr(text), expected=expected, remedy="write mine=FOLDER, or leave it out")
     return label, rest

@@ -52,8 +52,8 @@ class StoredTracks:
             seal.check_run(folder)
 
     def sequence(self, fps: float | None) -> Sequence:
-        """Returns a `Sequence` without frames that stands for the tracked one, from run.json. fps: the frame rate,
-        required if run.json does not state it and else forbidden (None)."""
+        """Returns a `Sequence` without frames that stands for the tracked one, from run.json. fps: the frame rate;
+        None: that of run.json, else 25 with a warning. Raises InputError if both are given."""
         self.check()
         info, scale = self.info, self.info.get("px_per_m")
         if "fps" in info:

@@ -1,4 +1,7 @@
-"""The camera calibration that a user gives for a recording (`--camera FILE`): read it, scale it to the pictures.
+"""The camera calibration that a user gives for a recording (`--camera FILE`, `replay --calibration FILE`).
+
+It is Tsai's XML, a file of OpenCV or ROS, or flockscope's own camera.json. Readers of recordings scale it to their
+pictures.
 
 *Tsai's calibration as XML* (as in PETS 2009): a world point X becomes x_cam = (x, y, z) = R X + T in mm, with R = Rz Ry
 Rx of the angles rx, ry, rz (rad) and T = (tx, ty, tz). Ideal sensor position: (f x/z, f y/z) in mm, f the focal length.

@@ -59,8 +59,9 @@ FAST = 12.0  # m/s that nobody keeps up. Half of the steps above it are centimet
 def ground_positions(table: MotTable) -> Array | None:
     """Returns the ground positions x, y, z in m, (N, 3), nan where unknown (z = -1); None if there are none.
 
-    If people would move impossibly in metres, and no file beside the text says that it is in metres, the result is
-    None, with a warning.
+    None, with a warning, if columns 8 to 10 cannot be people's places in m (they jump, are shared, hold few whole
+    numbers, lie in the own boxes, or stay while boxes move), and no manifest.json, camera.json or run.json beside the
+    text or one folder up says that they are. None without a warning if all rows are equal.
     """
     known, doubt = _known(table)
     if doubt:

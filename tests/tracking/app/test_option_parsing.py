@@ -63,3 +63,9 @@ def test_labels_of_runs_and_trackers(tmp_path: Path, monkeypatch, capsys) -> Non
     assert run(["stress", f"old={FAKE}", FAKE, *options]) == 0
     assert json.loads(Path("o/stress.json").read_text())["curves"].keys() == {"old", FAKE, "oracle"}
     assert "first twice" in refused(capsys, "score", "data", "first=lr=0.1", f"first={FAKE}")
+
+
+@pytest.mark.parametrize("text", ["=blob", " =blob", "mine=", "oracle x=blob"])
+def test_a_label_says_something_and_is_not_the_oracles(text):
+    with pytest.raises(InputError, match="LABEL=RUN"):
+        split_label(text)

@@ -294,9 +294,10 @@ class Relational(Particle):
     def walking_together(self) -> tuple[Ints, Array]:
         """Returns ids (R,) of the people reported last, and the probability (R, R) that two of them walk together.
 
-        By their state it is the share of the weight of the particles in which the pair is related, given that both
-        exist. The belief is the same in all particles, so that it is the probability itself; a share of particles would
-        be the belief with errors of sampling, and weights would count the detections twice. 1 on the diagonal.
+        With the config's `relation_evidence` "state": the share of the weight of the particles in which the pair is
+        related, given that both exist. With "belief": the belief's probability, which is the same in all particles; a
+        share of particles would add errors of sampling, and weights would count the detections twice. 1 on the
+        diagonal.
         """
         rows = np.zeros(0, np.int64) if self.shown is None else np.flatnonzero(np.isin(self.slots.id, self.shown.id))
         return self.slots.id[rows], self.together[np.ix_(rows, rows)]
