@@ -11,10 +11,11 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from benchmarks.pages.blocks import BLOCK, differing, pages
+from benchmarks.pages.blocks import BLOCK, differing
 from benchmarks.pages.parts import PARTS, keys_of_scenarios
 from benchmarks.pages.places import CONFIGS, DOCSTRINGS, NAMES
 from benchmarks.pages.python_names import without_entry
+from benchmarks.results import pages
 from scenarios.loading.resolve import names, suite_names
 from sim.dataset.generate import generate
 from tests.processes import ROOT

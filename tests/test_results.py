@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import benchmarks
-from benchmarks import headline, results
+from benchmarks import results
 from scenarios.loading.resolve import read_suite, resolve
 
 TABLES = results.tables()
@@ -30,11 +30,6 @@ def test_every_table_is_shown_and_every_file_belongs_to_one():
 @pytest.mark.parametrize("name", [table.name for table in TABLES.values() if table.headline])
 def test_a_headline_is_not_older_than_the_code(name):
     assert not results.is_stale(TABLES[name]), f"python -m benchmarks results {name}"
-
-
-def test_the_sentences_of_readme_are_those_of_the_tables():
-    text = headline.README.read_text(encoding="utf-8")
-    assert headline.written(text) == text, "python -m benchmarks headline --write"
 
 
 def one(*cells: str) -> list[dict[str, object]]:

@@ -1,4 +1,4 @@
-"""Writes the parts of the pages that are made from the code.
+"""Writes the parts of README and docs that are made from the code and the stored results.
 
     python -m benchmarks pages [--check]
 
@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import sys
 
-from benchmarks.pages.blocks import differing, pages, with_parts
+from benchmarks.pages.blocks import differing, with_parts
+from benchmarks.results import pages
 from benchmarks.support.options import new_parser
 
 

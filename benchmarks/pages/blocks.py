@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 from benchmarks.pages.parts import PARTS, ROOT
+from benchmarks.results import pages
 
 BLOCK = re.compile(r"^(<!-- generated: (\S+) ?(\S*) -->\n).*?^(<!-- end -->)$", re.DOTALL | re.MULTILINE)
-
-
-def pages() -> list[Path]:
-    """Returns all pages that may have such parts."""
-    return sorted((ROOT / "docs").rglob("*.md"))
 
 
 def with_parts(text: str) -> str:

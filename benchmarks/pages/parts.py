@@ -14,6 +14,7 @@ from typing import Any
 from benchmarks.pages.markdown import cell, prose, row, table
 from benchmarks.pages.places import CONFIGS, DOCSTRINGS
 from benchmarks.pages.python_names import section
+from benchmarks.pages.results_in_words import comparisons, tuning
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -224,6 +225,7 @@ PARTS: dict[str, Callable[..., str]] = {
     "axes": axes,
     "catalogue": catalogue,
     "commands": commands,
+    "comparisons": comparisons,
     "constants": constants,
     "docstring": docstring,
     "observations": observations,
@@ -233,4 +235,5 @@ PARTS: dict[str, Callable[..., str]] = {
     "scenario-keys": scenario_keys,
     "scores": scores,
     "suites": suites,
+    "tuning": tuning,
 }

@@ -1,26 +1,17 @@
-"""The sentences of README that have figures, made from the stored tables: python -m benchmarks headline [--write]
-
-Prints them, or writes them into README.md between `<!-- headline: NAME -->` and `<!-- end -->`. A test compares.
-"""
+"""The sentences of README that have figures, made from the stored tables of results."""
 
 from __future__ import annotations
 
-import json
-import re
-from pathlib import Path
 from typing import Any
 
-from benchmarks.support.options import new_parser
+from benchmarks import results
 
-ROOT = Path(__file__).resolve().parents[1]
-README, RESULTS = ROOT / "README.md", ROOT / "docs" / "results"
-BLOCK = re.compile(r"(<!-- headline: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 RECORDINGS = {"PETS09-S2L1": "PETS", "TUD-Campus": "TUD", "AVG-TownCentre": "TownCentre"}
 
 
 def stored(table: str, title: str = "") -> dict[str, Any]:
     """Returns the stored table whose title begins so: its title, columns and rows of cells."""
-    tables = json.loads((RESULTS / f"{table}.json").read_text(encoding="utf-8"))["tables"]
+    tables = results.stored(results.tables()[table])["tables"]
     return next(t for t in tables if t["title"].startswith(title))
 
 
@@ -32,7 +23,7 @@ def rows(table: str, title: str = "") -> list[dict[str, str]]:
 
 def number(cell: str, digits: int = 2) -> str:
     """Returns the first number of a cell, rounded."""
-    found = re.search(r"[-+]?\d+(\.\d+)?", cell)
+    found = results.NUMBER.search(cell)
     assert found is not None, cell
     return f"{float(found[0]):.{digits}f}"
 
@@ -42,7 +33,12 @@ def signed(cell: str) -> str:
     return f"{float(number(cell, 3)):+.2f}{' *' * cell.endswith('*')}".replace("-", "−")
 
 
-def peers() -> str:
+def comparisons() -> str:
+    """People, groups and speed beside other software."""
+    return "\n".join([_people(), _groups(), _speed()])
+
+
+def _people() -> str:
     """`blob` beside trackers of individuals, on simulated and on real boxes."""
     parts = []
     for title in ("Scenes with occlusion", *RECORDINGS):
@@ -64,7 +60,7 @@ def peers() -> str:
     )
 
 
-def groups() -> str:
+def _groups() -> str:
     """The belief of who belongs together beside SPENCER."""
     found = {row["recording"]: row for row in rows("belonging-recordings")}
     listed = " and ".join(
@@ -77,7 +73,7 @@ def groups() -> str:
     )
 
 
-def speed() -> str:
+def _speed() -> str:
     """Simulator beside JuPedSim, scores beside TrackEval."""
     simulated = rows("simulator")
     ratios = [number(row["ratio (range)"], 1) for row in simulated]
@@ -105,24 +101,3 @@ def tuning() -> str:
         " ([table](docs/results/trackers.md#does-tuning-on-simulated-scenes-help-on-recordings); a star: the 95 %"
         " interval does not hold 0)."
     )
-
-
-PARTS = {"results": lambda: "\n".join([peers(), groups(), speed()]), "tuning": tuning}
-
-
-def written(text: str) -> str:
-    """Returns the text of README with the sentences of the tables stored now."""
-    return BLOCK.sub(lambda found: f"{found[1]}{PARTS[found[2]]()}\n{found[3]}", text)
-
-
-def main() -> None:
-    parser = new_parser(__doc__)
-    parser.add_argument("--write", action="store_true", help="write them into README.md")
-    if parser.parse_args().write:
-        README.write_text(written(README.read_text(encoding="utf-8")), encoding="utf-8")
-    else:
-        print("\n\n".join(part() for part in PARTS.values()))
-
-
-if __name__ == "__main__":
-    main()
