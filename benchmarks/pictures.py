@@ -16,7 +16,7 @@ visibility samples a grid of 16 x 32 points per person, orders people by distanc
 flat.
 gallery: one frame of several scenarios, most of them the quarter with most people; of `crowd` also the ids (left half)
 and disparities (right half, black where unknown). trackers: the idea of each tracker, in docs/trackers. guides:
-pictures of docs/guides, and of docs/start with their replays.
+pictures of docs/guides, and of docs/start with the data of their replays.
 """
 
 from __future__ import annotations

@@ -1,15 +1,19 @@
 """Sphinx configuration of the site (`make docs`). `python -m benchmarks pages` makes the parts that come from the code.
 
-Pages are written for a code host. The site differs in four things: links to README, CONTRIBUTING and CHANGELOG lead to
-their pages, commands are wrapped, intervals are not, and `<!-- pages TITLE: a b -->` is a part of the navigation.
+Pages are written for a code host. The site differs in five things: links to README, CONTRIBUTING and CHANGELOG lead to
+their pages, commands are wrapped, intervals are not, `<!-- pages TITLE: a b -->` is a part of the navigation, and the
+picture NAME.jpg below `<!-- replay -->` opens the replay page of the data in docs/start/NAME.json.
 """
 
 from __future__ import annotations
 
+import json
 import re
 import tomllib
 from pathlib import Path
 from typing import Any
+
+from tracking.app.replay_page.page import page_html, script_json
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -34,6 +38,7 @@ OUTSIDE = re.compile(r"\]\((?:\.\./)+(README|CONTRIBUTING|CHANGELOG)\.md")
 PAGE_OF = {"README": "index.md", "CONTRIBUTING": "contributing.md", "CHANGELOG": "changelog.md"}
 INTERVAL = re.compile(r"(?<=\d \[)([-+]?[\d.]+,) (?=[-+]?[\d.]+\])|(?<=\d\]) (?=\*)")
 COMMANDS = re.compile(r"^```\n(?=(flockscope|python|pip|make) )", re.MULTILINE)
+REPLAY = re.compile(r"^<!-- replay -->\n!\[(.*)\]\((\w+)\.jpg\)$", re.MULTILINE)
 PAGES = re.compile(r"^<!-- pages (\w+): (.*) -->$", re.MULTILINE)
 
 
@@ -41,6 +46,7 @@ def for_the_site(text: str) -> str:
     """Returns the text of a page as the site shows it."""
     text = OUTSIDE.sub(lambda found: f"](/{PAGE_OF[found[1]]}", text)
     text = COMMANDS.sub("```sh\n", INTERVAL.sub("\\1\N{NO-BREAK SPACE}", text))
+    text = REPLAY.sub(r'<a href="../_static/replay-\2.html"><img src="\2.jpg" alt="\1"></a>', text)
     return PAGES.sub(lambda found: navigation(*found.groups()), text)
 
 
@@ -55,4 +61,11 @@ def setup(app: Any) -> None:
     def read(_app: Any, _name: str, source: list[str]) -> None:
         source[0] = for_the_site(source[0])
 
+    def replays(app: Any, error: Exception | None) -> None:
+        for path in [] if error else sorted((ROOT / "docs" / "start").glob("*.json")):
+            data = json.loads(path.read_text(encoding="utf-8"))
+            page = page_html(data["name"], script_json(data))
+            (Path(app.outdir) / "_static" / f"replay-{path.stem}.html").write_text(page, encoding="utf-8")
+
     app.connect("source-read", read)
+    app.connect("build-finished", replays)

@@ -22,7 +22,7 @@ SCENES = {"split": "blob", "cross": "relational", "queue": "joint"}
 
 
 def write(docs: Path) -> Iterator[Path]:
-    """Writes all pictures and replays, and yields their paths."""
+    """Writes all pictures and the data of replays, and yields their paths."""
     yield curve(docs / "guides" / "where-it-breaks.md", docs / "guides" / "where-it-breaks.svg")
     yield verdicts(docs / "guides" / "gate.svg")
     with tempfile.TemporaryDirectory() as folder:
@@ -62,22 +62,29 @@ def verdicts(out: Path) -> Path:
 
 
 def scenes(folder: Path, docs: Path) -> Iterator[Path]:
-    """Makes sheets and replays of the gallery, and the sheets of two tutorials."""
-    static = docs / "_static"
+    """Makes sheets and the data of replays of the gallery, and the sheets of two tutorials."""
     for name, tracker in SCENES.items():
-        made, tracks, replay = folder / name, folder / f"{name}-tracks", static / f"replay-{name}.html"
+        made, tracks, replay = folder / name, folder / f"{name}-tracks", folder / f"{name}.html"
         command("generate", name, "--seeds", "40000", "--set", "camera.fps=5", "--out", made)
         command("track", tracker, made, "--detections", "file", "--out", tracks)
         yield sheet(made, docs / "start" / f"{name}.jpg", 3, tracks)
         plain = folder / f"{name}-plain"
         command("generate", name, "--seeds", "40000", "--set", "camera.fps=5", "--streams", "none", "--out", plain)
         command("view", plain / "flockscope-demo" / f"{name}-s40000", f"{tracker}={tracks}", "--out", replay)
-        yield replay
+        yield data_of(replay, docs / "start" / f"{name}.json")
     made = folder / "merges"
     command("generate", "merge", "--seeds", "0", "--set", "camera.fps=5", "--out", made)
     yield sheet(made, docs / "guides" / "sheet.jpg", 4)
     command("track", "blob", made, "--detections", "file", "--out", folder / "boxes")
     yield sheet(made, docs / "start" / "first-ten-minutes.jpg", 3, folder / "boxes")
+
+
+def data_of(replay: Path, out: Path) -> Path:
+    """Writes the data that a replay page shows; docs/conf.py puts it into the page of today."""
+    found = re.search(r'<script type="application/json" id="data">(.*?)</script>', replay.read_text(encoding="utf-8"))
+    assert found is not None
+    out.write_text(f"{found[1]}\n", encoding="utf-8")
+    return out
 
 
 def sheet(dataset: Path, out: Path, frames: int, run_of: Path | None = None) -> Path:
