@@ -93,10 +93,10 @@ function showFacts(frame) {
   });
 }
 
-// For each tracker the errors at a frame in words, at most two.
+// Shows the errors of each tracker at a frame in words.
 function showErrors(frame) {
   const shown = data.errors.length ? sides.filter(side => side.tracked && options[side.name]) : [];
-  const words = shown.map(side => errorsAt(side, frame).slice(0, 2));
+  const words = shown.map(side => errorsAt(side, frame));
   const key = JSON.stringify([shown.map(side => side.name), words.map(found => found.map(error => data.errors.indexOf(error)))]);
   if ($("now").dataset.key === key) return;
   $("now").dataset.key = key;
