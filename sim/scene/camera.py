@@ -125,8 +125,15 @@ def to_ground(camera: Camera, uv: Array, z: float | Array = 0.0) -> Array:
 
     z: m, one number or (N,). nan where the line of sight meets no such point in front of the camera.
     """
-    origin, direction = rays(camera, uv)
-    return np.asarray(origin[:, :2] + _reach(origin, direction, z)[:, None] * direction[:, :2])
+    return at_height(*rays(camera, uv), z)
+
+
+def at_height(origin: Array, direction: Array, z: float | Array) -> Array:
+    """Returns x, y (..., N, 2) m of the points of height z, m, on lines of sight as of `rays`; nan where none is.
+
+    z: one number, (N,) or (..., N or 1).
+    """
+    return np.asarray(origin[:, :2] + _reach(origin, direction, z)[..., None] * direction[:, :2])
 
 
 def seen_ground(camera: Camera, uv: Array, scene: Scene | None) -> Array:

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.scene.body import BODY, DEPTH_SHARE, HEAD, PERSON_HEIGHT, SHOULDER_SHARE
-from sim.scene.camera import foot_points, project, seen_ground, standing_share, to_ground
+from sim.scene.camera import at_height, foot_points, project, rays, seen_ground, standing_share, to_ground
 from sim.scene.terrain import height_at
 from sim.types import Array, Camera, Scene
 
@@ -56,8 +56,8 @@ def standing_points(box: Array, camera: Camera, scene: Scene | None = None) -> A
     if scene is None or not scene.stairs:
         place[known], _ = _standing(box[known], np.zeros(int(known.sum())), camera)
         return place
-    ends = [_standing_on_stairs(box[known], camera, scene, last) for last in (False, True)]
-    (near, h), (far, h_far) = ends
+    found, tall = _standing_on_stairs(np.concatenate([box[known]] * 2), camera, scene)
+    (near, far), (h, h_far) = np.split(found, 2), np.split(tall, 2)
     taken = np.abs(h_far - PERSON_HEIGHT) < np.abs(h - PERSON_HEIGHT)
     place[known] = np.where(taken[:, None], far, near)
     return place
@@ -74,19 +74,22 @@ def _standing(box: Array, z: Array, camera: Camera) -> tuple[Array, Array]:
     return (a + b) / 2, (two[0, :, 2] + two[1, :, 2]) / 2
 
 
-def _standing_on_stairs(box: Array, camera: Camera, scene: Scene, last: bool) -> tuple[Array, Array]:
-    """Returns places and heights as `_standing`, on the first or the last ground on the line of sight."""
+def _standing_on_stairs(box: Array, camera: Camera, scene: Scene) -> tuple[Array, Array]:
+    """Returns places and heights as `_standing`: of the first half of the boxes on the first ground on the line of
+    sight, of the second half on the last."""
     rises = [stairs.rise for stairs in scene.stairs]
     levels = np.linspace(max(0.0, *rises), min(0.0, *rises), LEVELS)
+    last = np.arange(len(box)) >= len(box) // 2
     foot, standing = box[:, :2] + box[:, 2:] * [0.5, 1.0], (np.zeros((len(box), 2)), np.zeros(len(box)))
     for _ in range(ROUNDS):
-        below = np.stack([z <= height_at(scene, to_ground(camera, foot, z)) for z in levels])
-        first = LEVELS - below[::-1].argmin(axis=0) if last else below.argmax(axis=0)
+        sight = rays(camera, foot)
+        below = levels[:, None] <= height_at(scene, at_height(*sight, levels[:, None]))
+        first = np.where(last, LEVELS - below[::-1].argmin(axis=0), below.argmax(axis=0))
         first = np.clip(first, 1, LEVELS - 1)
         high, low = levels[first - 1], levels[first]
         for _ in range(HALVINGS):
             z = (high + low) / 2
-            under = z <= height_at(scene, to_ground(camera, foot, z))
+            under = z <= height_at(scene, at_height(*sight, z))
             high, low = np.where(under, high, z), np.where(under, z, low)
         standing = _standing(box, (high + low) / 2, camera)
         foot, _ = project(camera, np.column_stack([standing[0], (high + low) / 2]))

@@ -144,11 +144,15 @@ def test_a_tracker_that_ends_the_process_is_an_error_that_names_it(tmp_path: Pat
     done = subprocess.run(command(tmp_path, statement), cwd=tmp_path, env=ENV, capture_output=True, text=True)
     assert done.returncode == 1
     assert re.search(rf"error: mine.py:Mine: got the end of the process, with {ENDS[statement]}; ", done.stderr)
-    done = subprocess.run(command(tmp_path, statement, "--json"), cwd=tmp_path, env=ENV, capture_output=True, text=True)
+
+
+def test_the_end_of_the_process_as_json_and_with_a_limit_of_time(tmp_path: Path) -> None:
+    line = command(tmp_path, "os._exit(7)", "--json")
+    done = subprocess.run(line, cwd=tmp_path, env=ENV, capture_output=True, text=True)
     assert json.loads(done.stdout)["error"]["file"] == "mine.py:Mine"
-    limited = command(tmp_path, statement, "--step-timeout", "60")
-    done = subprocess.run(limited, cwd=tmp_path, env=ENV, capture_output=True, text=True)
-    assert re.search(rf"error: mine.py:Mine: gt, frame 1: got .* ended with {ENDS[statement]}", done.stderr)
+    line = command(tmp_path, "os.kill(os.getpid(), 9)", "--step-timeout", "60")
+    done = subprocess.run(line, cwd=tmp_path, env=ENV, capture_output=True, text=True)
+    assert re.search(r"error: mine.py:Mine: gt, frame 1: got .* ended with signal 9", done.stderr)
 
 
 def test_the_end_of_a_worker_names_the_tracker(tmp_path: Path) -> None:

@@ -268,7 +268,7 @@ def test_several_scores_are_corrected_together(tmp_path, capsys):
     assert judged(["HOTA", "MOTA", "IDF1", "DetA"], names, before, after, 0.0)[0]["verdict"] == "too noisy"
 
 
-@pytest.mark.parametrize("sequences", [2, 3, 6, 12, 24])
+@pytest.mark.parametrize("sequences", [2, 3, 6, *(pytest.param(n, marks=pytest.mark.slow) for n in (12, 24))])
 @pytest.mark.parametrize("scores", [1, 4])
 def test_calls_without_a_difference_are_rarely_regressions(sequences, scores):
     """At most 5 % of 1000 calls, plus two standard deviations of the count, for each law."""
