@@ -16,6 +16,7 @@ from tracking.tuning.options import TuneOptions
 ARGUMENT = partial(option, flag="")
 SET = partial(option, "Set a value. Can be given several times.", [], flag="--set", metavar="K=V")
 OUT = partial(option, "Folder to write to.", metavar="DIR")
+NEW_OUT = partial(option, "Folder to write to, new or empty.", metavar="DIR", flag="--out")
 TOML = partial(option, metavar="FILE.toml", flag="--out")
 FILE = partial(option, flag="--out")
 NAMES = partial(ARGUMENT, "Scenarios, *.toml files or suites.", metavar="NAME…")
@@ -44,6 +45,8 @@ GROUPING = partial(
     metavar="rule|belief|FILE.toml")
 SEEDS = partial(option, metavar="A:B")
 SEEDS_HELP = "Seeds from A to B - 1, or one seed."
+MIN_VISIBILITY = partial(
+    option, "People of whom a smaller share is visible are ignored.", 0.2, low=0, high=1, metavar="SHARE")
 Images = Literal["jpg", "png", "mp4"] | None
 Detections = Literal["image", "truth", "file"] | None
 Similarity = Literal["boxes", "ground", "image"] | None
@@ -347,13 +350,32 @@ class CocoOptions(Options, words="export coco", run="export:export_coco"):
     folder: Path = ARGUMENT("A sequence, or dataset of one split, with labelled boxes.", metavar="DIR")
     out: Path = FILE("File to write.", metavar="FILE.json")
     person_class: str | None = PERSON_CLASS()
+    min_visibility: float = MIN_VISIBILITY()
+
+
+class YoloOptions(Options, words="export yolo", run="export:export_yolo"):
+    """Write pictures and labels as YOLO reads them."""
+
+    folder: Path = ARGUMENT("A sequence or dataset with pictures and labelled boxes.", metavar="DIR")
+    out: Path = NEW_OUT()
+    person_class: str | None = PERSON_CLASS()
+    min_visibility: float = MIN_VISIBILITY()
 
 
 class KittiOptions(Options, words="export kitti", run="export:export_kitti"):
-    """Write stereo pairs, disparities and calibrations as in KITTI."""
+    """Write pictures or stereo pairs, disparities, calibrations and labels as in KITTI."""
 
-    folder: Path = ARGUMENT("A generated sequence or dataset with stereo pairs.", metavar="DIR")
+    folder: Path = ARGUMENT("A generated sequence or dataset with pictures.", metavar="DIR")
     out: Path = OUT()
+    min_visibility: float = MIN_VISIBILITY()
+
+
+class MotsOptions(Options, words="export mots", run="export:export_mots"):
+    """Write pictures and masks as in MOTS."""
+
+    folder: Path = ARGUMENT("A generated sequence or dataset with the streams left and ids.", metavar="DIR")
+    out: Path = NEW_OUT()
+    min_visibility: float = MIN_VISIBILITY()
 
 
 class WebdatasetOptions(Options, words="export webdataset", run="export:export_webdataset"):
@@ -361,7 +383,13 @@ class WebdatasetOptions(Options, words="export webdataset", run="export:export_w
 
     folder: Path = ARGUMENT("A generated sequence or dataset.", metavar="DIR")
     out: Path = OUT()
-    shard_size: str = option("Largest shard, as 500MB or 2GB; a larger sequence has its own.", "1GB", metavar="SIZE")
+    shard_size: str = option("Largest shard, as 500MB or 2GB; a larger sample has its own.", "1GB", metavar="SIZE")
+    sample: Literal["sequence", "frame"] = option(
+        "What a sample is: all files of a sequence, or the picture and the labels of a frame.", "sequence")
+    seed: int | None = option("Seed of the order of frames. Default: 0.", None, low=0)
+    min_visibility: float | None = option(
+        "Of frames: people of whom a smaller share is visible are ignored. Default: 0.2.", None, low=0, high=1,
+        metavar="SHARE")
 
 
 class TrajnetOptions(LabelOptions, words="export trajnet", run="export:export_trajnet"):

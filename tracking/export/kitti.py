@@ -66,9 +66,8 @@ def calibration(camera: Camera) -> str:
 
 def _export(folder: Path, target: Path) -> None:
     stored = StoredPictures(folder, read_whole_manifest(folder))
-    missing = [name for name in ("left", "right") if name not in stored.streams]
-    remedy = "generate it with --streams left,right,disparity"
-    reject(missing, folder, f"no stream {' or '.join(missing)}", "left and right", remedy)
+    remedy = "generate it with --streams left, or left,right,disparity"
+    reject("left" not in stored.streams, folder, "no stream left", "pictures of the left camera", remedy)
     write_file(target / "calib.txt", calibration(read_camera(folder / "camera.json")).encode())
     about = stored.manifest["sequence"]
     times = "".join(f"{k / about['fps']:.6e}\n" for k in range(about["length"]))

@@ -12,6 +12,7 @@ import os
 import re
 import tarfile
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -26,8 +27,9 @@ from sim.store.seal import MANIFEST, read_whole_manifest
 from tracking.recordings.source import generated_folders
 
 BLOCK = 512  # bytes: a tar holds whole blocks
+END = 2 * BLOCK + tarfile.RECORDSIZE  # bytes at the end of a tar, at most
 UNITS = {"": 1, "k": 10**3, "M": 10**6, "G": 10**9}
-INDEX = "index.json"
+INDEX, SHARD = "index.json", r"shard-[0-9]{6,}\.tar"
 
 Progress = Callable[[int, int, str], None]
 
@@ -46,36 +48,53 @@ def webdataset(
     Returns:
         The index: format, content_hash, and of each shard name, sequences (content hashes by name), bytes and sha256.
     """
-    root, shards, done = Path(out), _shards(Path(source), shard_size), list[dict[str, Any]]()
+    root, shards = Path(out), _shards(Path(source), shard_size)
     hashes = {split_and_name(p): content for some in shards for p, content in some.items()}
-    content = hashing.dataset_hash(hashes)
+    head = {"format": tables.FORMAT, "content_hash": hashing.dataset_hash(hashes)}
+    with new_shards(root, head, [shard_name(number) for number in range(len(shards))]) as (partial, done):
+        for number, some in enumerate(shards):
+            done.append(_write_shard(partial / shard_name(number), some))
+            if progress is not None:
+                progress(len(done), len(shards), done[-1]["name"])
+    return {**head, "shards": done}
+
+
+@contextmanager
+def new_shards(
+    root: Path, head: dict[str, Any], names: list[str] | None = None
+) -> Iterator[tuple[Path, list[dict[str, Any]]]]:
+    """Yields a temporary folder for the block to write shards to, and a list for the facts of each in index.json.
+
+    When the block ends the shards become files of `root`, and index.json is written, which has `head` and the facts.
+    names: of the shards; None if they are only known at the end. Raises InputError if `root` holds anything but an
+    export with the same head and names.
+    """
     with lock_folder(root):
         remove_partials(root)
-        _reject_others(root, content, len(shards))
+        _reject_others(root, head, names)
         # Inside the folder, which may be a link, a mount or the current one.
         with staged_path(root / INDEX) as partial:
             partial.mkdir()
-            for number, some in enumerate(shards):
-                done.append(_write_shard(partial / _name(number), some))
-                if progress is not None:
-                    progress(len(done), len(shards), done[-1]["name"])
-            index = {"format": tables.FORMAT, "content_hash": content, "shards": done}
+            done: list[dict[str, Any]] = []
+            yield partial, done
             (root / INDEX).unlink(missing_ok=True)
             for facts in done:
                 os.replace(partial / facts["name"], root / facts["name"])
-            write_file(root / INDEX, tables.json_document(index))
-    return index
+            write_file(root / INDEX, tables.json_document({**head, "shards": done}))
 
 
-def _name(number: int) -> str:
+def shard_name(number: int) -> str:
+    """Returns the file name of a shard, by its number from 0."""
     return f"shard-{number:06d}.tar"
 
 
-def _reject_others(root: Path, content: str, count: int) -> None:
-    """Raises InputError if the folder holds anything but the same export."""
+def _reject_others(root: Path, head: dict[str, Any], names: list[str] | None) -> None:
     found = {path.name for path in root.iterdir() if not is_side_file(path.name)}
-    stored = tables.read_json(root / INDEX).get("content_hash") if INDEX in found else None
-    if found and not (stored == content and found == {INDEX, *map(_name, range(count))}):
+    stored = tables.read_json(root / INDEX) if INDEX in found else {}
+    others = found - {INDEX}
+    fits = others == set(names) if names is not None else all(re.fullmatch(SHARD, name) for name in others)
+    # the index of whole sequences has no key "sample"
+    if found and not (fits and all(stored.get(key) == head.get(key) for key in ("sample", *head))):
         got, remedy = "other files, or another export", "choose another --out, or delete that folder"
         raise InputError(file=root, got=got, expected="this dataset in shards of this size, or nothing", remedy=remedy)
 
@@ -99,35 +118,50 @@ def _shards(source: Path, size: int) -> list[dict[Path, str]]:
         manifest = read_whole_manifest(folder)  # not kept: those of a large dataset would fill the memory
         sizes = {MANIFEST: (folder / MANIFEST).stat().st_size}
         sizes |= {name: facts["bytes"] for name, facts in manifest["files"].items()}
-        # A header before each file, and two more blocks with its name if that is long.
-        long = sum(len(f"{_key(folder)}.{name}".encode()) > tarfile.LENGTH_NAME for name in sizes)
-        more = BLOCK * (len(sizes) + 2 * long + sum(-(-count // BLOCK) for count in sizes.values()))
+        more = sum(member_bytes(f"{key_of(folder)}.{name}", count) for name, count in sizes.items())
         if full + more > size:
             shards.append({})
-            full = 2 * BLOCK + tarfile.RECORDSIZE  # the end of a tar, at most
+            full = END
         shards[-1][folder] = manifest["content_hash"]
         full += more
     return shards
 
 
-def _key(folder: Path) -> str:
+def member_bytes(name: str, size: int) -> int:
+    """Returns the bytes that a file of `size` bytes takes in a tar."""
+    # A header before each file, and two more blocks with its name if that is long.
+    long = len(name.encode()) > tarfile.LENGTH_NAME
+    return BLOCK * (1 + 2 * long + -(-size // BLOCK))
+
+
+def key_of(folder: Path) -> str:
+    """Returns the key of a sequence folder: <split>/<name>, with dots as %2E."""
     return split_and_name(folder).replace(".", "%2E")  # webdataset ends a key at its first dot
 
 
 def _write_shard(path: Path, some: dict[Path, str]) -> dict[str, Any]:
     with tarfile.open(path, "w", format=tarfile.GNU_FORMAT) as tar:
         for name, body in (member for folder in some for member in _members(folder)):
-            info = tarfile.TarInfo(name)
-            info.size = len(body)
-            tar.addfile(info, io.BytesIO(body))
+            add_member(tar, name, body)
     sequences = {split_and_name(folder): content for folder, content in some.items()}
-    facts = {"name": path.name, "sequences": sequences, "bytes": path.stat().st_size}
-    return {**facts, "sha256": hashing.file_hash(path)}
+    return {"name": path.name, "sequences": sequences, **file_facts(path)}
+
+
+def add_member(tar: tarfile.TarFile, name: str, body: bytes) -> None:
+    """Adds a file to a tar, without time or owner."""
+    info = tarfile.TarInfo(name)
+    info.size = len(body)
+    tar.addfile(info, io.BytesIO(body))
+
+
+def file_facts(path: Path) -> dict[str, Any]:
+    """Returns size and hash of a shard as in index.json."""
+    return {"bytes": path.stat().st_size, "sha256": hashing.file_hash(path)}
 
 
 def _members(folder: Path) -> Iterator[tuple[str, bytes]]:
     """Yields name and content of each file of a sequence as it stands in the tar, the manifest first."""
     stored = StoredPictures(folder, read_whole_manifest(folder))
-    yield f"{_key(folder)}.{MANIFEST}", (folder / MANIFEST).read_bytes()
+    yield f"{key_of(folder)}.{MANIFEST}", (folder / MANIFEST).read_bytes()
     for name in stored.manifest["files"]:
-        yield f"{_key(folder)}.{name.replace('/', '.')}", stored.check(name, whole=True)
+        yield f"{key_of(folder)}.{name.replace('/', '.')}", stored.check(name, whole=True)

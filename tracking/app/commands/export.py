@@ -1,4 +1,4 @@
-"""`flockscope export`: datasets as COCO, KITTI and webdataset; runs and truths as CSV, Parquet, TrajNet++ and PedPy.
+"""`flockscope export`: datasets as COCO, YOLO, KITTI, MOTS and webdataset; people as tables and texts.
 
 The formats themselves are in tracking.export.
 """
@@ -6,11 +6,20 @@ The formats themselves are in tracking.export.
 from __future__ import annotations
 
 from functools import partial
+from typing import Any
 
-from scenarios.errors import InputError, counted
+from scenarios.errors import InputError, counted, reject
 from sim.store.seal import reject_sealed
 from sim.types import Sequence
-from tracking.app.command_options import CocoOptions, CsvOptions, KittiOptions, TrajnetOptions, WebdatasetOptions
+from tracking.app.command_options import (
+    CocoOptions,
+    CsvOptions,
+    KittiOptions,
+    MotsOptions,
+    TrajnetOptions,
+    WebdatasetOptions,
+    YoloOptions,
+)
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 from tracking.app.sequence_workers import source_of
@@ -25,32 +34,63 @@ def export_coco(options: CocoOptions) -> CommandResult:
     from sim.store.own_files import output_file
     from tracking.export.coco import coco
 
-    path = coco(options.folder, output_file(options.out, ".json"), person_class=options.person_class)
+    path = output_file(options.out, ".json")
+    made = coco(options.folder, path, person_class=options.person_class, min_visibility=options.min_visibility)
     root = options.folder if options.folder.is_dir() else options.folder.parent
-    return CommandResult({"file": path, "root": root}, f"{path}\nfile names are relative to {root}")
+    lines = [str(path), made.text, f"file names are relative to {root}"]
+    return CommandResult({"file": path, "root": root, **made.counts}, "\n".join(lines))
+
+
+def export_yolo(options: YoloOptions) -> CommandResult:
+    """Writes pictures, labels and data.yaml of all sequences with pictures and labelled boxes into a new folder."""
+    from tracking.export.yolo import yolo
+
+    made = yolo(options.folder, options.out, person_class=options.person_class, min_visibility=options.min_visibility)
+    return CommandResult({"folder": made.path, **made.counts}, f"{made.path}\n{made.text}")
 
 
 def export_kitti(options: KittiOptions) -> CommandResult:
-    """Writes pairs, disparities and calibrations of all sequences of a generated dataset into the folder --out."""
+    """Writes pictures, disparities, calibrations and labels of a generated dataset into the folder --out."""
     from tracking.export.kitti import kitti
+    from tracking.export.kitti_labels import kitti_labels
 
     folders = kitti(options.folder, options.out)
-    return CommandResult({"folders": folders}, "\n".join(map(str, folders)))
+    made = kitti_labels(options.folder, options.out, min_visibility=options.min_visibility)
+    return CommandResult({"folders": folders, **made.counts}, "\n".join([*map(str, folders), made.text]))
+
+
+def export_mots(options: MotsOptions) -> CommandResult:
+    """Writes pictures and masks of all sequences of a generated dataset into a new folder."""
+    from tracking.export.mots import mots
+
+    made = mots(options.folder, options.out, min_visibility=options.min_visibility)
+    return CommandResult({"folder": made.path, **made.counts}, f"{made.path}\n{made.text}")
 
 
 def export_webdataset(options: WebdatasetOptions) -> CommandResult:
     """Writes tar shards of all sequences of a generated dataset into the folder of --out, and an index.json."""
+    from tracking.export.frame_shards import frame_shards
     from tracking.export.webdataset import size_of, webdataset
 
     out, size = options.out, size_of(options.shard_size)
+    of_frames = {name: getattr(options, name) for name in ("seed", "min_visibility")}
+    of_frames = {name: value for name, value in of_frames.items() if value is not None}
+    counts: dict[str, Any] = {}
     with ProgressMeter("export") as meter:
-        index = webdataset(options.folder, out, shard_size=size, progress=meter.update)
+        if options.sample == "frame":
+            made, index = frame_shards(options.folder, out, shard_size=size, progress=meter.update, **of_frames)
+            counts, what = made.counts, made.text
+        else:
+            for name in of_frames:
+                flag = f"--{name.replace('_', '-')}"
+                reject(True, "", "--sample sequence", "--sample frame", f"leave out {flag}, or add it", flag)
+            index = webdataset(options.folder, out, shard_size=size, progress=meter.update)
+            what = counted(sum(len(s["sequences"]) for s in index["shards"]), "sequence")
     shards = index["shards"]
-    count, total = sum(len(s["sequences"]) for s in shards), sum(s["bytes"] for s in shards)
-    packed = f"{counted(count, 'sequence')} in {counted(len(shards), 'shard')}"
-    text = f"{packed}, {total / 1e6:.1f} MB; content {index['content_hash'][:16]}"
-    files = [out / s["name"] for s in shards]
-    return CommandResult({"shards": files, "bytes": total, "content_hash": index["content_hash"]}, text)
+    total = sum(s["bytes"] for s in shards)
+    text = f"{what} in {counted(len(shards), 'shard')}, {total / 1e6:.1f} MB; content {index['content_hash'][:16]}"
+    facts = {"shards": [out / s["name"] for s in shards], "bytes": total, "content_hash": index["content_hash"]}
+    return CommandResult(facts | counts, text)
 
 
 def export(form: Form, options: TrajnetOptions) -> CommandResult:
