@@ -27,8 +27,8 @@ PEOPLE = 999  # highest person id that class × 1000 + id can hold
 Codes = NDArray[np.uint16]
 
 
-def check_streams(streams: Iterable[str], images: str) -> tuple[str, ...]:
-    """Returns the given streams in the order of STREAMS; "left" and "right" each add "background".
+def check_streams(streams: Iterable[str], images: str, background: bool = True) -> tuple[str, ...]:
+    """Returns the given streams in the order of STREAMS; "left" and "right" each add "background", if `background`.
 
     Raises InputError for an unknown stream, or if `images` is none of the file types "jpg", "png" and "mp4".
     """
@@ -39,7 +39,7 @@ def check_streams(streams: Iterable[str], images: str) -> tuple[str, ...]:
         raise InputError(place="--streams", got=", ".join(unknown), expected=expected, remedy="correct --streams")
     if images not in IMAGES:
         raise InputError(place="--images", got=images, expected=" or ".join(IMAGES), remedy="correct --images")
-    if wanted & {"left", "right"}:
+    if background and wanted & {"left", "right"}:
         wanted.add("background")
     return tuple(name for name in STREAMS if name in wanted)
 

@@ -110,7 +110,8 @@ def store(job: SequenceJob, sequence: Sequence) -> None:
     if not is_stored(job):
         sequence_folder.write_sequence(
             job.folder, replace(sequence, name=job.name), scenario=dump(job.entry.scenario), seed=job.seed,
-            repeat=job.entry.repeat, streams=job.streams, images=job.images, keep=lambda: is_stored(job),
+            repeat=job.entry.repeat, streams=job.streams, images=job.images, background=False,
+            keep=lambda: is_stored(job),
         )  # fmt: skip
 
 
@@ -182,7 +183,7 @@ class Folders(list[Path]):
 def generate(
     entries: Iterable[Entry | str], seeds: range, out: str | Path, *, set: Iterable[str] = (),
     workers: WorkerOptions = ONE_WORKER, progress: Progress | None = None, streams: Iterable[str] = ("left",),
-    images: str = "jpg", stride: int = 1,
+    images: str = "jpg", background: bool = True, stride: int = 1,
 ) -> Folders:  # fmt: skip
     """Simulates every entry with every seed, and stores each sequence as OUT/flockscope-<split>/<name>-s<seed>/.
 
@@ -198,6 +199,7 @@ def generate(
         progress: Called as progress(sequences done, sequences in all, name of the last one) after each.
         streams: Pictures to store: some of "left", "right", "disparity", "ids", "background"; () for none.
         images: Their file type, "jpg", "png" or "mp4".
+        background: True adds "background" to "left" and "right".
         stride: N stores every N-th frame of the camera only: 1, 1 + N, …, numbered from 1.
 
     Returns:
@@ -210,7 +212,7 @@ def generate(
     """
     split, root = split_of(seeds), Path(out) if workers.cluster is None else Path(out).absolute()
     folder = root / f"flockscope-{split}"
-    settings, wanted = tuple(set), check_streams(streams, images)
+    settings, wanted = tuple(set), check_streams(streams, images, background)
     found = [e for entry in entries for e in (resolve(entry, settings) if isinstance(entry, str) else [entry])]
     output_paths(folder, [entry.name for entry in found], source="entries")
     for entry in found:
@@ -295,13 +297,13 @@ def _summary(errors: dict[str, FlockscopeError], total: int) -> FlockscopeError:
 def store_replays(
     sources: Iterable[Sequence], view: ObservationSpec, seeds: range, out: str | Path, *, cut: Cut = WHOLE,
     calibration: Camera | None = None, streams: Iterable[str] = ("left",), images: str = "jpg",
-    progress: Progress | None = None,
+    background: bool = True, progress: Progress | None = None,
 ) -> list[Path]:  # fmt: skip
     """Stores a replay of every source with every seed in folders named as by `generate`; returns the folders.
 
     view: camera, sensor, light and picture, with the frame rate. cut: the part of each recording to replay.
     calibration: camera of recordings that have boxes but no ground positions; None if not needed; an
-    error for others. streams, images, progress: as for `generate`.
+    error for others. streams, images, background, progress: as for `generate`.
 
     The first error is raised and ends the work; replays stored before it are kept. Recordings of real motion need seeds
     from 20,000 on, else InputError.
@@ -313,7 +315,7 @@ def store_replays(
         got, expected = f"{seeds.start} ({split})", "seeds from 20000 (test) on, for real motion"
         remedy = "choose other seeds: nothing is tuned on recordings"
         raise InputError(place="--seeds", got=got, expected=expected, remedy=remedy)
-    wanted = check_streams(streams, images)
+    wanted = check_streams(streams, images, background)
     made: list[Path] = []
     with _dataset(root, folder):
         try:

@@ -173,6 +173,8 @@ class StoredPictures:
 
     def background(self, choice: BackgroundChoice | None) -> tuple[Callable[[], Image] | None, dict[str, str]]:
         """Returns (loader of background pictures, entry for `Sequence.source`); (None, {}) if there are none."""
+        if choice is None and "left" in self.streams and "background" not in self.streams:
+            choice = BackgroundChoice()  # as of a recording
         if choice is not None:
             remedy = "leave it out: it has none"
             reject("left" not in self.streams, self.folder, "--background", "none for one without pictures", remedy)

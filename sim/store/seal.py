@@ -165,9 +165,10 @@ def is_own_sequence(folder: Path) -> bool:
 def identity(scenario: str, seed: int, repeat: int, streams: Iterable[str] = (), images: str = "jpg") -> dict[str, Any]:
     """Returns the fields of a manifest that identify a sequence.
 
-    scenario: TOML text of the resolved scenario. repeat: number of the suite entry's copy, 0 without copies.
+    scenario: TOML text of the resolved scenario. repeat: number of the suite entry's copy, 0 without copies. streams:
+    all that are stored.
     """
-    wanted = check_streams(streams, images)
+    wanted = check_streams(streams, images, background=False)
     return {
         "format": tables.FORMAT, "schema": 1, "engine": hashing.ENGINE, "seed": seed, "repeat": repeat,
         "scenario_hash": hashing.scenario_hash(scenario), "streams": list(wanted), "images": coding(wanted, images),

@@ -31,7 +31,7 @@ NOTHING: Mapping[str, Any] = {}
 
 def write_sequence(
     folder: Path, sequence: Sequence, *, scenario: str, seed: int, repeat: int = 0, streams: Iterable[str] = (),
-    images: str = "jpg", keep: Callable[[], bool] = lambda: False,
+    images: str = "jpg", background: bool = True, keep: Callable[[], bool] = lambda: False,
 ) -> Path:  # fmt: skip
     """Writes a sequence as a folder, complete or not at all.
 
@@ -41,8 +41,9 @@ def write_sequence(
         scenario: TOML text of the resolved scenario.
         seed: Seed of the simulation.
         repeat: Number of the suite entry's copy, 0 without copies.
-        streams: Pictures to store: "left", "right", "disparity", "ids"; "left" and "right" add "background".
+        streams: Pictures to store: "left", "right", "disparity", "ids", "background".
         images: File type of the pictures, "jpg", "png" or "mp4".
+        background: True adds the stream "background" to "left" and "right".
         keep: Called before an existing folder is replaced; if it returns True, that folder stays.
 
     Returns:
@@ -52,7 +53,7 @@ def write_sequence(
         InputError: A stream is unknown or missing, or a file that flockscope did not write would be lost.
         WorkError: The disk is full, an order of the script failed, or a stream cannot hold an id or disparity.
     """
-    wanted, names = check_streams(streams, images), set[str]()
+    wanted, names = check_streams(streams, images, background), set[str]()
     with atomic.new_folder(folder, lambda: keep() or _refuse_foreign(folder, names)) as partial:
         truth = sequence.truth  # raises for a failed script before a picture is drawn
         assert truth is None or truth.length == sequence.length

@@ -93,6 +93,7 @@ class PictureOptions(SceneOptions):
 
     streams: str = STREAMS()
     images: Images = IMAGES()
+    no_background: bool = option("Store no pictures of the empty scene, which left and right otherwise add.", False)
 
 
 class WorkerOptions(Options):

@@ -23,7 +23,8 @@ def generate(options: GenerateOptions) -> CommandResult:
     with ProgressMeter("generate") as meter:
         folders = make(
             options.names, seeds, options.out, set=settings, workers=WorkerOptions(options.workers, options.cluster),
-            progress=meter.update, streams=streams, images=images, stride=options.stride,
+            progress=meter.update, streams=streams, images=images, background=not options.no_background,
+            stride=options.stride,
         )  # fmt: skip
     lines = [f"{counted(len(folders), 'sequence')} in {folders[0].parent}"]
     left_out = {name: reason.line() for name, reason in folders.left_out.items()}
@@ -69,7 +70,7 @@ def replay(options: ReplayCommandOptions) -> CommandResult:
     with ProgressMeter("replay") as meter:
         folders = store_replays(
             recordings, view, seeds, options.out, cut=cut, calibration=calibration, streams=streams,
-            images=images, progress=meter.update,
+            images=images, background=not options.no_background, progress=meter.update,
         )  # fmt: skip
     text = f"{counted(len(folders), 'sequence')} in {folders[0].parent}"
     return CommandResult({"sequences": folders, "folder": folders[0].parent}, text)
