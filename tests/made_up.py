@@ -152,6 +152,14 @@ def make_pictured(seed: int, streams: tuple[str, ...], length: int = 12) -> Sequ
     )  # fmt: skip
 
 
+def make_in_view(seed: int, streams: tuple[str, ...], length: int = 12) -> Sequence:
+    """As `make_pictured`, with all boxes near the picture or in it."""
+    live = make_pictured(seed, streams, length)
+    box = np.random.default_rng([seed, 4]).uniform((-8, -8, 5, 5), (64, 48, 20, 30), (len(live.truth.id), 4))
+    truth = live.truth.replace(box=box)
+    return replace(live, load_truth=lambda: truth)
+
+
 def make_tracks(
     seed: int, length: int = 9, plane: str = "ground", unit: str = "person", boxed: bool = True
 ) -> list[Tracks]:

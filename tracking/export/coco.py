@@ -25,7 +25,7 @@ from sim.store.own_files import GENERATOR, output_paths, split_and_name
 from sim.store.seal import read_whole_manifest, reject_sealed
 from sim.store.tables import json_text
 from sim.types import Bools, Sequence
-from tracking.export.labelled_pictures import MIN_VISIBILITY, Exported, LabelledPictures, labelled_pictures
+from tracking.export.labelled_pictures import MIN_VISIBILITY, Exported, LabelledPictures, in_turn, labelled_pictures
 
 PERSON = {"id": 1, "name": "person", "supercategory": "person"}
 
@@ -59,7 +59,7 @@ def coco(
     output_paths("", [each.sequence.name for each in labelled], source=source)
     root = source if source.is_dir() else source.parent
     videos, images, annotations, ignored = [], list[str](), list[str](), 0
-    for k, each in enumerate(labelled, 1):
+    for k, each in enumerate(in_turn(labelled), 1):
         sequence, files = each.sequence, each.files()
         shape = dict(zip(("width", "height"), each.size, strict=True))
         about = {"id": k, "name": sequence.name, "fps": sequence.fps, "length": sequence.length}

@@ -32,6 +32,7 @@ from tracking.export.labelled_pictures import (
     MIN_VISIBILITY,
     Exported,
     LabelledPictures,
+    in_turn,
     labelled_pictures,
     stored_picture,
 )
@@ -74,7 +75,10 @@ def frame_shards(
         InputError: A sequence is no generated one, has no pictures or labels, or differs from its hashes; there are
             several splits; or `out` holds something else.
     """
-    root, folders = Path(out), generated_folders(Path(source))
+    root = Path(out)
+    generated_folders(Path(source))  # refuses recordings
+    labelled = labelled_pictures(Path(source), min_visibility, pictured=True, one_split=True)
+    folders = [Path(each.sequence.source["path"]) for each in labelled]
     hashes = {split_and_name(folder): read_whole_manifest(folder)["content_hash"] for folder in folders}
     reject(len(hashes) < len(folders), source, "two sequences of one name", "unique names", "export them apart")
     plan: dict[str, Any] = {
@@ -82,12 +86,12 @@ def frame_shards(
         "shard_size": shard_size, "min_visibility": min_visibility,
     }  # fmt: skip
     samples, kept, ignored = list[Sample](), 0, 0
-    for each in labelled_pictures(Path(source), min_visibility, pictured=True, one_split=True):
-        for index in range(1, (each.sequence.length or 0) + 1):
+    for each, folder in zip(in_turn(labelled), folders, strict=True):
+        for index in range(1, each.truth.length + 1):
             document = labels(each, index)
             hidden = sum(person["ignored"] for person in document["people"])
             kept, ignored = kept + len(document["people"]) - hidden, ignored + hidden
-            samples.append((Path(each.sequence.source["path"]), index, tables.json_text(document).encode()))
+            samples.append((folder, index, tables.json_text(document).encode()))
     order = np.random.default_rng(seed).permutation(len(samples)).tolist()
     with new_shards(root, plan) as (partial, shards):
         _write(partial, shards, [samples[k] for k in order], shard_size, progress)

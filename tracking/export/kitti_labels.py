@@ -31,6 +31,7 @@ from tracking.export.labelled_pictures import (
     Exported,
     LabelledPictures,
     PicturePeople,
+    in_turn,
     labelled_pictures,
 )
 
@@ -56,7 +57,7 @@ def kitti_labels(source: str | Path, out: str | Path, *, min_visibility: float =
     """
     labelled, out = labelled_pictures(Path(source), min_visibility), Path(out)
     counts, listed = np.zeros(3, np.int64), dict[str, list[str]]()
-    for each in labelled:
+    for each in in_turn(labelled):
         split, _, name = split_and_name(Path(each.sequence.source["path"])).partition("/")
         reject_sealed(out / split)
         length = each.truth.length

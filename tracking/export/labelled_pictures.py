@@ -10,7 +10,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -83,7 +83,7 @@ class LabelledPictures:
     sequence: Sequence
     min_visibility: float
 
-    @cached_property
+    @property
     def truth(self) -> Truth:
         """The truth of the sequence."""
         assert self.sequence.truth is not None
@@ -169,7 +169,9 @@ def labelled_pictures(
     share = 0 <= min_visibility <= 1
     reject(not share, "", f"{min_visibility:g}", "a share from 0 to 1", "correct it", "--min-visibility")
     sequences = open_source(source, person_class=person_class)
-    sequences = [s for s in sequences if s.truth is not None and s.truth.box is not None]
+    # of copies: each keeps the truth that it has loaded
+    truths = ((s, replace(s).truth) for s in sequences)
+    sequences = [s for s, truth in truths if truth is not None and truth.box is not None]
     reject(not sequences, source, "no labelled boxes", "a dataset with boxes", "give a generated dataset")
     made = [s.source for s in sequences if s.source.get("kind") == "generated"]
     splits = sorted({split_of(range(facts["seed"], facts["seed"] + 1)) for facts in made})
@@ -181,6 +183,12 @@ def labelled_pictures(
         expected, remedy = "pictures and labelled boxes", "generate with --streams left"
         reject(not sequences, source, "no pictures", expected, remedy)
     return [LabelledPictures(sequence, min_visibility) for sequence in sequences]
+
+
+def in_turn(labelled: list[LabelledPictures]) -> Iterator[LabelledPictures]:
+    """Yields each sequence; its truth is freed after its turn, as those of a large dataset would fill the memory."""
+    for each in labelled:
+        yield replace(each, sequence=replace(each.sequence))
 
 
 @contextmanager

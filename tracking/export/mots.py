@@ -25,6 +25,7 @@ from tracking.export.labelled_pictures import (
     Exported,
     LabelledPictures,
     PicturePeople,
+    in_turn,
     labelled_pictures,
     new_export,
 )
@@ -47,18 +48,18 @@ def mots(source: str | Path, out: str | Path, *, min_visibility: float = MIN_VIS
         InputError: A sequence has no pictures or no ids, two have one name, or `out` is not empty.
     """
     labelled = labelled_pictures(Path(source), min_visibility, pictured=True)
-    remedy = "generate with --streams left,ids --images png"
+    remedy = "generate with --streams left,ids"
     for each in labelled:
         got = "no stream ids" if each.sequence.load_pixels is None else ""
         reject(got, each.sequence.source["path"], got, "the streams left and ids", remedy)
-    folders = [(each, f"MOTS-{each.split}") for each in labelled]
+    folders = [f"MOTS-{each.split}" for each in labelled]
     names = [path.name for path in output_paths("", [each.sequence.name for each in labelled], source=source)]
     counts = np.zeros(3, np.int64)
     with new_export(Path(out)) as root:
-        for (each, folder), name in zip(folders, names, strict=True):
+        for each, folder, name in zip(in_turn(labelled), folders, names, strict=True):
             counts += _write(each, root / folder / name, name)
-        for folder in sorted({folder for _, folder in folders}):
-            listed = [name for (_, other), name in zip(folders, names, strict=True) if other == folder]
+        for folder in sorted(set(folders)):
+            listed = [name for other, name in zip(folders, names, strict=True) if other == folder]
             write_inside(root / f"seqmaps/{folder}.txt", "\n".join(["name", *listed, ""]).encode())
     pictures, kept, ignored = counts.tolist()
     return Exported(Path(out), pictures, kept, ignored, min_visibility)
@@ -71,7 +72,7 @@ def _write(labelled: LabelledPictures, target: Path, name: str) -> tuple[int, in
     for index, body, kind in labelled.pictures():
         people = labelled.people(index)
         codes = instances(people)
-        for code in (np.unique(codes[codes > 0])).tolist():
+        for code in np.unique(codes[codes > 0]).tolist():
             mask = compressed(run_lengths(codes == code))
             lines.append(f"{index} {code} {code // CLASS} {height} {width} {mask}\n")
         write_inside(target / f"img1/{index:06d}.{kind}", body)

@@ -13,7 +13,14 @@ import numpy as np
 
 from sim.store.atomic import write_inside
 from sim.store.own_files import GENERATOR, output_paths
-from tracking.export.labelled_pictures import MIN_VISIBILITY, Exported, LabelledPictures, labelled_pictures, new_export
+from tracking.export.labelled_pictures import (
+    MIN_VISIBILITY,
+    Exported,
+    PicturePeople,
+    in_turn,
+    labelled_pictures,
+    new_export,
+)
 
 KEYS = ("train", "val", "test")  # of data.yaml; trainers want the first two
 
@@ -41,21 +48,21 @@ def yolo(
     names = [path.name for path in output_paths("", [each.sequence.name for each in labelled], source=source)]
     pictures, kept, ignored = 0, 0, 0
     with new_export(Path(out)) as root:
-        for each, name in zip(labelled, names, strict=True):
+        for each, name in zip(in_turn(labelled), names, strict=True):
             for index, body, kind in each.pictures():
-                stem, hidden = f"{each.split}/{name}-{index:06d}", each.people(index).ignored
+                stem, people = f"{each.split}/{name}-{index:06d}", each.people(index)
+                hidden = int(people.ignored.sum())
                 write_inside(root / f"images/{stem}.{kind}", body)
-                write_inside(root / f"labels/{stem}.txt", label(each, index).encode())
-                pictures, kept, ignored = pictures + 1, kept + int((~hidden).sum()), ignored + int(hidden.sum())
+                write_inside(root / f"labels/{stem}.txt", label(people, each.size).encode())
+                pictures, kept, ignored = pictures + 1, kept + len(people.id) - hidden, ignored + hidden
         splits = {each.split for each in labelled}
         lines = [f"{split}: images/{split}" for split in sorted(splits, key=(*KEYS, *sorted(splits)).index)]
         write_inside(root / "data.yaml", "\n".join([f"# {GENERATOR}", *lines, "names:", "  0: person", ""]).encode())
     return Exported(Path(out), pictures, kept, ignored, min_visibility)
 
 
-def label(labelled: LabelledPictures, index: int) -> str:
-    """Returns the label of the picture of frame `index` (from 1): a line for each person who is not ignored."""
-    people = labelled.people(index)
-    corners = people.part[~people.ignored] / [*labelled.size, *labelled.size]
-    middle, size = (corners[:, :2] + corners[:, 2:]) / 2, corners[:, 2:] - corners[:, :2]
-    return "".join(f"0 {x:.6f} {y:.6f} {w:.6f} {h:.6f}\n" for x, y, w, h in np.hstack([middle, size]).tolist())
+def label(people: PicturePeople, size: tuple[int, int]) -> str:
+    """Returns the label of a picture: a line for each person who is not ignored. size: width and height, px."""
+    corners = people.part[~people.ignored] / [*size, *size]
+    middle, sides = (corners[:, :2] + corners[:, 2:]) / 2, corners[:, 2:] - corners[:, :2]
+    return "".join(f"0 {x:.6f} {y:.6f} {w:.6f} {h:.6f}\n" for x, y, w, h in np.hstack([middle, sides]).tolist())

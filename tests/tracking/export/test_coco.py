@@ -7,7 +7,7 @@ import pytest
 from scenarios.errors import InputError
 from sim.store import sequence_folder
 from sim.store.validate import content_hash
-from tests.made_up import make_pictured, make_sequence
+from tests.made_up import make_in_view, make_sequence
 from tests.recordings import mot_folder
 from tracking.export.coco import coco
 
@@ -66,7 +66,7 @@ def test_names_of_pictures_of_recordings_resolve(tmp_path):
     labelled_folder(tmp_path / "set/s", rows, pictures=pictures, ini="imDir=frames\nimExt=.png\nseqLength=4\n")
     for source in (tmp_path / "set", tmp_path / "set/s"):
         with pytest.warns(UserWarning, match="pictures 0 to 3 are taken as frames 1 to 4"):
-            path = coco(source, tmp_path / "out/c.json")
+            path = coco(source, tmp_path / "out/c.json").path
         found = json.loads(path.read_text())
         root = path.parent / found["info"]["root"]
         assert root.resolve() == source
@@ -81,7 +81,7 @@ def test_names_of_pictures_of_recordings_resolve(tmp_path):
 def test_pictures_after_the_last_frame_are_no_images(tmp_path):
     pictures = [f"img1/{k:06d}.png" for k in (1, 2, 3)]
     labelled_folder(tmp_path / "s", ["1,1,5,5,9,9,1,1,1"], pictures=pictures, ini="seqLength=2\n")
-    path = coco(tmp_path / "s", tmp_path / "c.json")
+    path = coco(tmp_path / "s", tmp_path / "c.json").path
     assert [i["frame"] for i in json.loads(path.read_text())["images"]] == [1, 2]
 
 
@@ -91,11 +91,21 @@ def test_people_outside_the_picture_are_left_out(tmp_path):
         "1,5,-4,40,10,20,1,1,0.3", "1,6,10,10,5,5,1,1,0.1",
     ]  # fmt: skip
     labelled_folder(tmp_path / "s", rows, ini="imWidth=64\nimHeight=48\n")
-    path = coco(tmp_path / "s", tmp_path / "c.json")
+    path = coco(tmp_path / "s", tmp_path / "c.json").path
     found = json.loads(path.read_text())["annotations"]
     assert [a["track_id"] for a in found] == [5, 6]
     assert found[0]["bbox"] == [-4, 40, 10, 20], "amodal and unclipped, as in gt.txt"
-    assert found[0]["segmentation"] == [[0, 40, 6, 40, 6, 48, 0, 48]], "the part inside the picture"
+    assert "segmentation" not in found[0], "without ids nobody knows the pixels"
+
+
+def test_hidden_people_are_ignored_regions(tmp_path):
+    rows = [f"1,{k},{9 * k},5,8,9,1,1,{share}" for k, share in ((1, 0.3), (2, 0.2), (3, 0.19), (4, 0))]
+    labelled_folder(tmp_path / "s", rows, ini="imWidth=64\nimHeight=48\n")
+    for least, crowds in ((0.2, [0, 0, 1, 1]), (0, [0, 0, 0, 0]), (1, [1, 1, 1, 1])):
+        made = coco(tmp_path / "s", tmp_path / "c.json", min_visibility=least)
+        found = json.loads(made.path.read_text())["annotations"]
+        assert [a["iscrowd"] for a in found] == crowds
+        assert (made.pictures, made.kept, made.ignored) == (1, crowds.count(0), crowds.count(1))
 
 
 def decoded(segmentation):
@@ -108,9 +118,9 @@ def decoded(segmentation):
 
 
 def test_masks_are_the_visible_pixels(tmp_path):
-    live = make_pictured(1, ("left", "ids"))
+    live = make_in_view(1, ("left", "ids"))
     stored(tmp_path / live.name, live, streams=("left", "ids"))
-    path = coco(tmp_path / live.name, tmp_path / "c.json")
+    path = coco(tmp_path / live.name, tmp_path / "c.json").path
     found = json.loads(path.read_text())
     frames = {i["id"]: i["frame"] for i in found["images"]}
     assert any(a["area"] > 0 for a in found["annotations"])
@@ -118,3 +128,24 @@ def test_masks_are_the_visible_pixels(tmp_path):
         right = live.load_pixels(frames[a["image_id"]]).ids == a["track_id"]
         assert np.array_equal(decoded(a["segmentation"]), right)
         assert a["area"] == right.sum()
+        assert a["iscrowd"] == (a["visibility"] < 0.2 or not right.any())
+
+
+@pytest.mark.parametrize("everybody", [False, True])
+@pytest.mark.parametrize("kind", ["bbox", "segm"])
+def test_the_truth_is_a_perfect_detector(tmp_path, kind, everybody, capsys):
+    """Also one that reports hidden people."""
+    evaluation = pytest.importorskip("pycocotools.cocoeval")
+    from pycocotools.coco import COCO
+
+    stored(tmp_path / "s", make_in_view(1, ("left", "ids")), streams=("left", "ids"))
+    truth = COCO(coco(tmp_path / "s", tmp_path / "c.json").path)
+    seen = [a for a in truth.dataset["annotations"] if a["area"] > 0 and (everybody or not a["iscrowd"])]
+    shape = {"bbox": lambda a: a["bbox"], "segm": truth.annToRLE}
+    field = {"bbox": "bbox", "segm": "segmentation"}[kind]
+    found = [{"image_id": a["image_id"], "category_id": 1, "score": 1.0, field: shape[kind](a)} for a in seen]
+    score = evaluation.COCOeval(truth, truth.loadRes(found), kind)
+    score.evaluate()
+    score.accumulate()
+    score.summarize()
+    assert score.stats[0] == pytest.approx(1.0)

@@ -65,6 +65,17 @@ def test_what_is_in_the_image_is_in_px():
     assert {"path_px", "speed_mean_px_s"} <= set(rows(tables.people_summary)[0])
 
 
+def test_people_of_a_truth_have_their_visibility():
+    """Only if there are boxes, of which they are shares."""
+    truth = make_sequence(1).truth
+    people = truth_tables(truth).people.columns
+    assert people["visibility"].tolist() == truth.visibility.tolist()
+    assert people["truncation"].tolist() == truth.truncation.tolist()
+    plain = truth_tables(truth.replace(box=None, truncation=None)).people.columns
+    assert {"visibility", "truncation"}.isdisjoint(plain)
+    assert {"visibility", "truncation"}.isdisjoint(run_tables(walk(), 2.0).people.columns)
+
+
 def test_people_summary():
     one, _, last = rows(run_tables(walk(), 2.0).people_summary)
     assert one == {

@@ -1,4 +1,4 @@
-"""`flockscope export csv` and `export parquet`: of runs and sequences, one or several, and what is refused."""
+"""`flockscope export`: tables of runs and sequences, one or several; training data with counts; what is refused."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ from pathlib import Path
 import pyarrow.parquet as pq
 import pytest
 
-from tests.refusals import answer
+from sim.store import sequence_folder
+from tests.made_up import make_in_view
+from tests.refusals import answer, refused
 from tests.short_scene import write_short_scene
 from tracking.app.cli import run
 from tracking.recordings.source import open_source
@@ -48,3 +50,31 @@ def test_several_have_a_folder_each(made: Path, tmp_path: Path) -> None:
     labels = pq.read_table(tmp_path / "data" / "scene-s20000" / "people.parquet")
     assert labels["x_m"].to_pylist() == first.truth.pos[:, 0].tolist()
     assert json.loads(labels.schema.metadata[b"flockscope"])["fps"] == first.fps
+
+
+@pytest.mark.parametrize("form", ["coco", "yolo", "kitti", "mots", "webdataset --sample frame"])
+def test_kept_and_ignored_people_are_counted(tmp_path: Path, form: str, capsys: pytest.CaptureFixture[str]) -> None:
+    live = make_in_view(1, ("left", "ids"))
+    sequence_folder.write_sequence(
+        tmp_path / "flockscope-train/s", live, scenario="schema = 1\n", seed=1, streams=("left", "ids"), images="png"
+    )
+    name, *options = form.split()
+    found = []
+    for share in ("0", "0.2"):
+        out = tmp_path / f"out{share}{'.json' if name == 'coco' else ''}"
+        words = ["export", name, tmp_path / "flockscope-train", *options, "--min-visibility", share, "--out", out]
+        found.append(answer(capsys, *words))
+    assert all(each["pictures"] == 12 for each in found)
+    assert found[0]["ignored"] == 0 < found[1]["ignored"] < found[0]["kept"]
+    assert found[1]["kept"] + found[1]["ignored"] == found[0]["kept"]
+    assert run([*map(str, words[:-1]), str(tmp_path / f"text{out.suffix if name == 'coco' else ''}")]) == 0
+    line = f"12 pictures; people: kept {found[1]['kept']}, ignored {found[1]['ignored']} with visibility under 0.2"
+    assert line in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("option", ["--seed", "--min-visibility"])
+def test_options_of_frames_are_refused_for_sequences(
+    made: Path, capsys: pytest.CaptureFixture[str], option: str
+) -> None:
+    line = refused(capsys, "export", "webdataset", made / "data", "--out", made / "no", option, "1")
+    assert f"{option}: got --sample sequence; expected --sample frame" in line
