@@ -14,6 +14,7 @@ from benchmarks.support.chart import COLOURS, Panel, lines
 from benchmarks.support.idea_pictures import figure_of, save
 from tracking.app.cli import run
 from tracking.app.pictures.contact_sheet import write_sheet
+from tracking.export.labelled_pictures import labelled_pictures
 from tracking.recordings.source import open_source
 from tracking.recordings.track_texts import read_tracks
 
@@ -77,6 +78,28 @@ def scenes(folder: Path, docs: Path) -> Iterator[Path]:
     yield sheet(made, docs / "guides" / "sheet.jpg", 4)
     command("track", "blob", made, "--detections", "file", "--out", folder / "boxes")
     yield sheet(made, docs / "start" / "first-ten-minutes.jpg", 3, folder / "boxes")
+    crowd = folder / "labels"
+    some = ["--set", "camera.fps=5", "--set", "duration=8", "--streams", "left,ids"]
+    command("generate", "crowd", "--seeds", "40000", *some, "--out", crowd)
+    yield labels(crowd, docs / "guides" / "labels.jpg")
+
+
+def labels(dataset: Path, out: Path) -> Path:
+    """Draws a frame with ignored people: boxes of those who count and of those who are ignored, beside their masks."""
+    (labelled,) = labelled_pictures(dataset, 0.4)
+    frames = [labelled.people(k) for k in range(1, labelled.truth.length + 1)]
+    index = int(np.argmax([people.ignored.sum() for people in frames]))
+    boxed = next(f.image for f in labelled.sequence if f.index == index + 1).copy()
+    masked, people, r = boxed.copy(), frames[index], np.random.default_rng(0)
+    assert people.ids is not None
+    for person, part, ignored in zip(people.id, people.part.round().astype(int).tolist(), people.ignored, strict=True):
+        ink = (60, 60, 255) if ignored else (60, 220, 255)
+        cv2.rectangle(boxed, tuple(part[:2]), tuple(part[2:]), ink, 1, cv2.LINE_AA)
+        shown = people.ids == person
+        paint = (60, 60, 255) if ignored else r.integers(90, 255, 3)
+        masked[shown] = (0.35 * masked[shown] + 0.65 * np.array(paint)).astype(np.uint8)
+    cv2.imwrite(str(out), np.hstack([boxed, masked]), [cv2.IMWRITE_JPEG_QUALITY, 72])
+    return out
 
 
 def data_of(replay: Path, out: Path) -> Path:

@@ -1,8 +1,9 @@
-"""KITTI export: stereo pairs, true disparities and calibration of generated sequences, named as in KITTI's data.
+"""KITTI export: pictures, true disparities and calibration of generated sequences, named as in KITTI's data.
 
-OUT/<split>/<name>/ of a sequence holds image_2 (left) and image_3 (right), 8-bit PNG; disp_noc_0, 16-bit PNG of 256
-times the disparity in px, 0 where it is unknown or the right camera does not see the point; times.txt, the time of each
-frame in s; and calib.txt. Pictures are named for the frame, from 000001.png.
+OUT/<split>/<name>/ of a sequence holds image_2 (left), 8-bit PNG; where they are stored image_3 (right) and disp_noc_0,
+16-bit PNG of 256 times the disparity in px, 0 where it is unknown or the right camera does not see the point;
+times.txt, the time of each frame in s; and calib.txt of a pinhole camera. Pictures are named for the frame, from
+000001.png.
 
 calib.txt has the matrices of KITTI's calibrations row by row, so that tools for its odometry and its object data read
 it. P0 to P3 (3 x 4) project points of the left camera's coordinates: there are no grey cameras, so P0 and P2 are the
@@ -30,10 +31,10 @@ FOLDERS = {"left": "image_2", "right": "image_3", "disparity": "disp_noc_0"}
 
 
 def kitti(source: str | Path, out: str | Path) -> list[Path]:
-    """Writes the pairs, disparities and calibrations of a generated dataset in KITTI's layout.
+    """Writes the pictures, disparities and calibrations of a generated dataset in KITTI's layout.
 
     Args:
-        source: A sequence or dataset with the streams left and right; disparities are written where stored.
+        source: A sequence or dataset with the stream left; right and disparity are written where stored.
         out: The folder; files of an earlier export are replaced.
 
     Returns:
@@ -68,7 +69,9 @@ def _export(folder: Path, target: Path) -> None:
     stored = StoredPictures(folder, read_whole_manifest(folder))
     remedy = "generate it with --streams left, or left,right,disparity"
     reject("left" not in stored.streams, folder, "no stream left", "pictures of the left camera", remedy)
-    write_file(target / "calib.txt", calibration(read_camera(folder / "camera.json")).encode())
+    camera = read_camera(folder / "camera.json")
+    if camera.kind == "pinhole":
+        write_file(target / "calib.txt", calibration(camera).encode())
     about = stored.manifest["sequence"]
     times = "".join(f"{k / about['fps']:.6e}\n" for k in range(about["length"]))
     write_file(target / "times.txt", times.encode())

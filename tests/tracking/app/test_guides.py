@@ -7,7 +7,10 @@ from __future__ import annotations
 
 import re
 import shlex
+import subprocess
+import sys
 from difflib import SequenceMatcher
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -118,6 +121,18 @@ def test_who_belongs_together(tmp_path, monkeypatch, capsys):
 def test_without_recordings(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     follow(name, False, capsys)
+
+
+def test_train_on_it(tmp_path, monkeypatch, capsys):
+    """Blocks of "py" need packages of others, and run where these are installed."""
+    monkeypatch.chdir(tmp_path)
+    follow("train-on-it", False, capsys)
+    text = (GUIDES / "train-on-it.md").read_text(encoding="utf-8")
+    blocks = [block[2] for block in BLOCK.finditer(text) if block[1] == "py"]
+    assert len(blocks) == 3
+    for body in blocks:
+        if all(find_spec(name) for name in re.findall(r"\b(pycocotools|supervision|webdataset)\b", body)):
+            subprocess.run([sys.executable, "-c", body], check=True)  # noqa: S603
 
 
 @pytest.mark.slow

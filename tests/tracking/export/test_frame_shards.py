@@ -111,11 +111,10 @@ def test_the_same_export_again_and_no_other(data: Path, tmp_path: Path) -> None:
     for change in ({"seed": 1}, {"shard_size": 60_000}, {"min_visibility": 0.3}):
         with pytest.raises(InputError, match="another export"):
             frame_shards(data, tmp_path / "out", **{"shard_size": 50_000, **change})
-    with pytest.raises(InputError, match="another export"):
-        webdataset(data, tmp_path / "out")
-    webdataset(data, tmp_path / "whole")
-    with pytest.raises(InputError, match="another export"):
-        frame_shards(data, tmp_path / "whole")
+    for first, second in ((webdataset, frame_shards), (frame_shards, webdataset)):
+        first(data, tmp_path / first.__name__)
+        with pytest.raises(InputError, match="another export"):
+            second(data, tmp_path / first.__name__)
     (tmp_path / "out/mine").touch()
     with pytest.raises(InputError, match="other files"):
         frame_shards(data, tmp_path / "out", shard_size=50_000)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -12,7 +13,7 @@ from scenarios.errors import InputError
 from sim.scene.camera import project_pair
 from sim.store import sequence_folder
 from sim.streams import decode_disparity
-from tests.made_up import make_pictured
+from tests.made_up import make_pictured, make_sequence
 from tests.sim.scene.test_camera_stereo import rig
 from tracking.export.kitti import calibration, kitti
 
@@ -30,6 +31,20 @@ def test_the_calibration_projects_as_the_camera_does() -> None:
     uvd = project_pair(camera, world)
     assert left[:, :2] / left[:, 2:] + 0.5 == pytest.approx(uvd[:, :2])
     assert left[:, 0] / left[:, 2] - right[:, 0] / right[:, 2] == pytest.approx(uvd[:, 2])
+
+
+@pytest.mark.parametrize("kind", ["pinhole", "top"])
+def test_pictures_of_one_camera(tmp_path, kind: str) -> None:
+    """Only a pinhole camera has a calibration of KITTI."""
+    live = make_pictured(3, ("left",))
+    down = replace(live.camera, kind="top", rotation=np.diag([1.0, -1.0, -1.0]), px_per_m=40.0)
+    live = live if kind == "pinhole" else replace(live, camera=down)
+    sequence_folder.write_sequence(tmp_path / "x/a", live, scenario="schema = 1\n", seed=3, streams=("left",))
+    (target,) = kitti(tmp_path / "x", tmp_path / "out")
+    assert sorted(os.listdir(target)) == [*(["calib.txt"] if kind == "pinhole" else []), "image_2", "times.txt"]
+    sequence_folder.write_sequence(tmp_path / "x/a", make_sequence(3), scenario="schema = 1\n", seed=3)
+    with pytest.raises(InputError, match="no stream left"):
+        kitti(tmp_path / "x", tmp_path / "out")
 
 
 def test_pairs_and_disparities_are_those_of_the_dataset(tmp_path) -> None:

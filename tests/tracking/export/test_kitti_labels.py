@@ -44,22 +44,27 @@ def test_levels(tmp_path: Path) -> None:
 
 def test_boxes_come_back(tmp_path: Path) -> None:
     """The reader scores who is neither truncated nor ignored; whole numbers are the centres of pixels."""
-    stored(tmp_path / "flockscope-train/s", make_sequence(1))
+    live, r = make_sequence(1), np.random.default_rng(0)
+    box = r.uniform((-8, -8, 20, 40), (630, 470, 60, 90), (len(live.truth.id), 4))
+    truth = live.truth.replace(box=box, truncation=r.uniform(0, 0.3, len(box)))
+    stored(tmp_path / "flockscope-train/s", replace(live, load_truth=lambda: truth))
     made = kitti_labels(tmp_path / "flockscope-train/s", tmp_path / "out")
     (labelled,) = labelled_pictures(tmp_path / "flockscope-train/s")
     folder = tmp_path / "out/flockscope-train"
     assert (folder / "evaluate_tracking.seqmap.flockscope-train").read_text() == "s empty 000000 000012\n"
     (back,) = open_source(folder / "label_02/s.txt")
-    kept = 0
+    kept = seen = 0
     for index in range(1, 13):
         people = labelled.people(index)
         scored = ~people.ignored & (labelled.truth.truncation[people.rows] < 0.15)
         here = back.truth.rows(index)
+        seen += int(scored.sum())
         assert back.truth.id[here].tolist() == people.id[scored].tolist()
         corners = np.hstack([back.truth.box[here, :2], back.truth.box[here, :2] + back.truth.box[here, 2:]])
         expected = np.clip(people.part[scored] - 0.5, 0, (639, 479, 639, 479))
         assert corners == pytest.approx(expected, abs=0.011)
         kept += int((~people.ignored).sum())
+    assert seen > 10
     found = rows(folder / "label_02/s.txt")
     assert (made.pictures, made.kept, made.ignored) == (12, kept, len(found) - kept)
     assert {len(row) for row in found} == {17}
@@ -96,8 +101,11 @@ def test_people_stand_where_the_calibration_projects_them(tmp_path: Path) -> Non
     assert np.abs(found[:, 1]).max() <= np.pi + 0.01
 
 
-def test_without_a_pinhole_camera_the_solids_are_unknown(tmp_path: Path) -> None:
-    live = replace(make_sequence(1), camera=None)
+@pytest.mark.parametrize("kind", [None, "top"])
+def test_without_a_pinhole_camera_the_solids_are_unknown(tmp_path: Path, kind: str | None) -> None:
+    live = make_sequence(1)
+    down = replace(live.camera, kind="top", rotation=np.diag([1.0, -1.0, -1.0]), px_per_m=40.0)
+    live = replace(live, camera=None if kind is None else down)
     kitti_labels(stored(tmp_path / "x/s", live), tmp_path / "out")
     found = rows(tmp_path / "out/x/label_02/s.txt")
     assert {(row[5], *row[10:]) for row in found} == {
