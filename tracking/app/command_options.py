@@ -16,7 +16,6 @@ from tracking.tuning.options import TuneOptions
 ARGUMENT = partial(option, flag="")
 SET = partial(option, "Set a value. Can be given several times.", [], flag="--set", metavar="K=V")
 OUT = partial(option, "Folder to write to.", metavar="DIR")
-NEW_OUT = partial(option, "Folder to write to, new or empty.", metavar="DIR", flag="--out")
 TOML = partial(option, metavar="FILE.toml", flag="--out")
 FILE = partial(option, flag="--out")
 NAMES = partial(ARGUMENT, "Scenarios, *.toml files or suites.", metavar="NAME…")
@@ -358,7 +357,7 @@ class YoloOptions(Options, words="export yolo", run="export:export_yolo"):
     """Write pictures and labels as YOLO reads them."""
 
     folder: Path = ARGUMENT("A sequence or dataset with pictures and labelled boxes.", metavar="DIR")
-    out: Path = NEW_OUT()
+    out: Path = OUT()
     person_class: str | None = PERSON_CLASS()
     min_visibility: float = MIN_VISIBILITY()
 
@@ -375,7 +374,7 @@ class MotsOptions(Options, words="export mots", run="export:export_mots"):
     """Write pictures and masks as in MOTS."""
 
     folder: Path = ARGUMENT("A generated sequence or dataset with the streams left and ids.", metavar="DIR")
-    out: Path = NEW_OUT()
+    out: Path = OUT()
     min_visibility: float = MIN_VISIBILITY()
 
 

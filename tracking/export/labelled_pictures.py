@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -21,7 +21,7 @@ from scenarios.errors import InputError, counted, reject
 from sim.dataset.splits import split_of
 from sim.pictures.stored_pictures import StoredPictures, encoded
 from sim.scene.visibility import image_size_of_boxes
-from sim.store import atomic
+from sim.store import atomic, tables
 from sim.store.own_files import is_side_file
 from sim.store.seal import read_whole_manifest, reject_sealed
 from sim.streams import file_name
@@ -29,6 +29,7 @@ from sim.types import Array, Bools, Ints, Sequence, Truth
 from tracking.recordings.mot_folder import left_pictures
 from tracking.recordings.source import open_source
 
+SEAL = "export.json"
 MIN_VISIBILITY = 0.2  # share of the body: people of whom less is visible are ignored
 
 
@@ -193,17 +194,17 @@ def in_turn(labelled: list[LabelledPictures]) -> Iterator[LabelledPictures]:
 
 @contextmanager
 def new_export(out: Path) -> Iterator[Path]:
-    """Yields a temporary folder that becomes the folder `out` when the block ends.
+    """Yields a temporary folder that becomes the folder `out` when the block ends. export.json lists the files in it.
 
-    Raises InputError if `out` holds something, or lies in the folder of a stored sequence or a run.
+    An earlier export is replaced. Raises InputError if `out` holds a file that no export.json there lists, or lies in
+    the folder of a stored sequence or a run.
     """
     out = out.absolute()
 
     def refuse() -> bool:
-        found = (
-            [out] if out.is_file() else [p for p in (out.iterdir() if out.exists() else ()) if not is_side_file(p.name)]
-        )
-        reject(found, out, "other files", "a new or an empty folder", "choose another --out, or delete it", "--out")
+        others = sorted(_files(out) - _listed(out / SEAL)) if out.is_dir() else [out.name] * out.exists()
+        got, expected = f"{next(iter(others), '')}, a file that flockscope did not write", "a new folder, or an export"
+        reject(others, out, got, expected, "move it away, or choose another --out", "--out")
         return False
 
     for folder in (out, *out.parents):
@@ -211,3 +212,17 @@ def new_export(out: Path) -> Iterator[Path]:
     refuse()
     with atomic.new_folder(out, refuse) as partial:
         yield partial
+        document = {"format": tables.FORMAT, "files": sorted({*_files(partial), SEAL})}
+        atomic.write_inside(partial / SEAL, tables.json_document(document))
+
+
+def _files(folder: Path) -> set[str]:
+    found = (p.relative_to(folder) for p in folder.rglob("*") if p.is_symlink() or not p.is_dir())
+    return {path.as_posix() for path in found if not is_side_file(path)}
+
+
+def _listed(seal: Path) -> set[str]:
+    with suppress(InputError):
+        files = tables.read_json(seal).get("files") if seal.is_file() else None
+        return set(filter(lambda name: isinstance(name, str), files if isinstance(files, list) else ()))
+    return set()

@@ -38,14 +38,14 @@ def mots(source: str | Path, out: str | Path, *, min_visibility: float = MIN_VIS
 
     Args:
         source: A sequence or dataset.
-        out: The folder; it must be missing or empty.
+        out: The folder; only an earlier export is replaced.
         min_visibility: Share of the body from 0 to 1; people of whom less is visible are an ignored region.
 
     Returns:
         The folder with the numbers of its pictures, masks of people, and ignored people.
 
     Raises:
-        InputError: A sequence has no pictures or no ids, two have one name, or `out` is not empty.
+        InputError: A sequence has no pictures or no ids, two have one name, or `out` holds other files.
     """
     labelled = labelled_pictures(Path(source), min_visibility, pictured=True)
     remedy = "generate with --streams left,ids"

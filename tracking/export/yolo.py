@@ -33,7 +33,7 @@ def yolo(
 
     Args:
         source: A dataset, of any number of splits, or recordings with pictures, which are of the split train.
-        out: The folder; it must be missing or empty.
+        out: The folder; only an earlier export is replaced.
         person_class: Classes of people, as `open_source` takes them.
         min_visibility: Share of the body from 0 to 1; people of whom less is visible are left out.
 
@@ -41,8 +41,8 @@ def yolo(
         The folder with the numbers of its pictures and boxes.
 
     Raises:
-        InputError: No sequence has pictures and labelled boxes, two have one name, `out` is not empty, or an argument
-            is wrong.
+        InputError: No sequence has pictures and labelled boxes, two have one name, `out` holds other files, or an
+            argument is wrong.
     """
     labelled = labelled_pictures(Path(source), min_visibility, person_class=person_class, pictured=True)
     names = [path.name for path in output_paths("", [each.sequence.name for each in labelled], source=source)]

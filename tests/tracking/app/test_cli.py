@@ -55,7 +55,7 @@ def made(tmp_path_factory) -> Path:
     (folder / "scene.toml").write_text(SCENE)
     line = ["generate", str(folder / "scene.toml"), "--out"]
     assert run([*line, str(folder / "data"), "--seeds", "40000:40002", "--streams", "none"]) == 0
-    pair = ["--streams", "left,right,disparity", "--set", "camera.baseline=0.2"]
+    pair = ["--streams", "left,right,disparity,ids", "--set", "camera.baseline=0.2"]
     assert run([*line, str(folder / "seen"), "--seeds", "40000", "--set", "camera.image=[128,96]", *pair]) == 0
     for name, out in (("data", "tracks"), ("seen/flockscope-demo/scene-s40000", "tracks-seen")):
         assert run(["track", FAKE, str(folder / name), "--out", str(folder / out)]) == 0
@@ -146,7 +146,12 @@ COMMANDS = {
     "export trajnet": ("export trajnet {data} --out {out}", "export trajnet {out}/nothing --out {out}/x"),
     "export pedpy": ("export pedpy {tracks}/scene-s40000 --out {out}", "export pedpy {scene} --out {out}"),
     "export coco": ("export coco {data} --out {out}/coco.json", "export coco {out}/nothing --out {out}/coco.json"),
+    "export yolo": ("export yolo {seen} --out {out}", "export yolo {one} --out {out}"),
+    "export mots": ("export mots {seen} --out {out}", "export mots {seen} --out {seen}"),
     "export kitti": ("export kitti {seen} --out {out}", "export kitti {one} --out {out}"),
+    "export webdataset frames": (
+        "export webdataset {seen} --sample frame --out {out}", "export webdataset {one} --sample frame --out {out}",
+    ),
     "export webdataset": (
         "export webdataset {data} --out {out}", "export webdataset {data} --out {out} --shard-size 0",
     ),

@@ -367,7 +367,10 @@ FLIPS = {
         "names": ("{0}/scene.toml", "cross --set camera.fps=5"), "seeds": ("--seeds 7", "--seeds 8"),
         "settings": "--set scenario.duration=3",
     },
-    SMALL: {"streams": "--streams left,ids", "images": "--images png", "stride": "--stride 2"},
+    SMALL: {
+        "streams": "--streams left,ids", "images": "--images png", "stride": "--stride 2",
+        "no_background": "--no-background",
+    },
     f"track blob {SEEN}/left.mp4 --px-per-m 12 --out {{1}}": {"background": "--background first:5"},
     RUN: {
         "tracker": ("blob", FAKE), "source": ("40000", "40001"), "params": "--params {0}/params.toml",
@@ -422,7 +425,12 @@ FLIPS = {
         f"export {form} {{0}}/px.csv --fps 5 --px-per-m 20 --out {{1}}": {"px_per_m": ("-m 20", "-m 40")}
         for form in ("csv", "parquet", "trajnet", "pedpy")
     },
-    "export coco {0}/data --out {1}/c.json": {"folder": ("data", "mot")},
+    "export coco {0}/data --out {1}/c.json": {"folder": ("data", "mot"), "min_visibility": "--min-visibility 1"},
+    **{f"export {form} {SEEN} --out {{1}}": {"min_visibility": "--min-visibility 1"} for form in ("yolo", "kitti")},
+    f"export webdataset {SEEN} --out {{1}}": {"sample": "--sample frame"},
+    f"export webdataset {SEEN} --sample frame --out {{1}}": {
+        "seed": "--seed 1", "min_visibility": "--min-visibility 1",
+    },
 }  # fmt: skip
 OPTIONS = {
     (line.removeprefix("export ").split()[0], option): (
@@ -439,6 +447,8 @@ ELSEWHERE = {
     ("score", "csv"),  # tests/tracking/scoring/test_protocols.py
     ("generate", "cluster"),  # and on a cluster: tests/sim/dataset/test_generate_cluster.py
     ("kitti", "folder"),  # tests/tracking/export/test_kitti.py
+    *(("yolo", option) for option in ("folder", "person_class")),  # test_yolo.py beside it
+    *(("mots", option) for option in ("folder", "min_visibility")),  # test_mots.py, commands/test_export.py
     ("demo", "quick"),  # the long one is for `make demo`
     ("generate", "sensor"),  # commands/test_fit.py
     ("track", "sensor"),

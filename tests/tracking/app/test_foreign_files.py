@@ -30,6 +30,7 @@ COMMANDS = {
     "replay": ("replay {0}/data --streams none --out {1}", "flockscope-test/scene-s20000-s20000/mine"),
     "track": ("track blob {0}/data/flockscope-test/scene-s20000 --out {1}", "groups.csv"),
     "export webdataset": ("export webdataset {0}/data --out {1}", "index.json"),
+    "export yolo": ("export yolo {0}/two --out {1}", "data.yaml"),
     "export csv": ("export csv {0}/data --out {1}", "scene-s20000/events.csv"),
     "export parquet": ("export parquet {0}/data --out {1}", "scene-s20000/people.parquet"),
     "export trajnet": ("export trajnet {0}/data --out {1}", "scene-s20000/people.ndjson"),

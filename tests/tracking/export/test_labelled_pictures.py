@@ -72,10 +72,21 @@ def test_a_new_export_is_whole_or_absent(tmp_path: Path, stored: Path) -> None:
     assert sorted(p.name for p in tmp_path.iterdir()) == ["s"]
     (tmp_path / "out").mkdir()
     (tmp_path / "out/.DS_Store").touch()
-    with new_export(tmp_path / "out") as partial:
-        (partial / "a").touch()
-    assert [p.name for p in (tmp_path / "out").iterdir()] == ["a"]
-    for place, words in (("out", "other files"), ("out/a", "other files"), ("s/deep/er", "of a sequence")):
+    for name in "ab":
+        with new_export(tmp_path / "out") as partial:
+            (partial / name).touch()
+        assert sorted(p.name for p in (tmp_path / "out").iterdir()) == [name, "export.json"], "the former is replaced"
+    (tmp_path / "out/mine").touch()
+    for place, words in (("out", "got mine, a file that"), ("out/b", "got b, a file that"), ("s/deep/er", "of a seq")):
         with pytest.raises(InputError, match=words), new_export(tmp_path / place):
             pass
-    assert [p.name for p in (tmp_path / "out").iterdir()] == ["a"]
+    assert sorted(p.name for p in (tmp_path / "out").iterdir()) == ["b", "export.json", "mine"]
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", '{"files": 5}', '{"files": [["a"], 5]}'])
+def test_a_list_of_another_program_lists_nothing(tmp_path: Path, text: str) -> None:
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out/export.json").write_text(text)
+    with pytest.raises(InputError, match=r"got export\.json, a file that"), new_export(tmp_path / "out"):
+        pass
+    assert (tmp_path / "out/export.json").read_text() == text

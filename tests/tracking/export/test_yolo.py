@@ -39,6 +39,14 @@ def test_a_recording(tmp_path: Path) -> None:
     assert (tmp_path / "out/data.yaml").read_text() == "# flockscope\ntrain: images/train\nnames:\n  0: person\n"
 
 
+@pytest.mark.filterwarnings("ignore:.*class")
+def test_classes_of_people(tmp_path: Path) -> None:
+    pictures = {"img1/000001.png": np.zeros((48, 64, 3), np.uint8)}
+    rows = "\n".join(f"1,{k},{9 * k},5,8,9,1,{k},1" for k in (1, 2, 3))
+    source = mot_folder(tmp_path / "s", rows, ini="name=walk\nframeRate=5\n", pictures=pictures)
+    assert (yolo(source, tmp_path / "a").kept, yolo(source, tmp_path / "b", person_class="2,3").kept) == (1, 2)
+
+
 @pytest.mark.parametrize("images", ["jpg", "mp4"])
 def test_splits_of_a_dataset(tmp_path: Path, images: str) -> None:
     for seed in (10_000, 1):
