@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal, dataclass_transform
 
+from tracking.export import MIN_VISIBILITY
 from tracking.keyword_options import option
 from tracking.tuning.options import TuneOptions
 
@@ -44,8 +45,8 @@ GROUPING = partial(
     metavar="rule|belief|FILE.toml")
 SEEDS = partial(option, metavar="A:B")
 SEEDS_HELP = "Seeds from A to B - 1, or one seed."
-MIN_VISIBILITY = partial(
-    option, "People of whom a smaller share is visible are ignored.", 0.2, low=0, high=1, metavar="SHARE")
+LEAST_VISIBLE = partial(option, low=0, high=1, metavar="SHARE")
+SMALLER = "people of whom a smaller share is visible are ignored."
 Images = Literal["jpg", "png", "mp4"] | None
 Detections = Literal["image", "truth", "file"] | None
 Similarity = Literal["boxes", "ground", "image"] | None
@@ -350,7 +351,7 @@ class CocoOptions(Options, words="export coco", run="export:export_coco"):
     folder: Path = ARGUMENT("A sequence, or dataset of one split, with labelled boxes.", metavar="DIR")
     out: Path = FILE("File to write.", metavar="FILE.json")
     person_class: str | None = PERSON_CLASS()
-    min_visibility: float = MIN_VISIBILITY()
+    min_visibility: float = LEAST_VISIBLE(SMALLER.capitalize(), MIN_VISIBILITY)
 
 
 class YoloOptions(Options, words="export yolo", run="export:export_yolo"):
@@ -359,7 +360,7 @@ class YoloOptions(Options, words="export yolo", run="export:export_yolo"):
     folder: Path = ARGUMENT("A sequence or dataset with pictures and labelled boxes.", metavar="DIR")
     out: Path = OUT()
     person_class: str | None = PERSON_CLASS()
-    min_visibility: float = MIN_VISIBILITY()
+    min_visibility: float = LEAST_VISIBLE(SMALLER.capitalize(), MIN_VISIBILITY)
 
 
 class KittiOptions(Options, words="export kitti", run="export:export_kitti"):
@@ -367,7 +368,7 @@ class KittiOptions(Options, words="export kitti", run="export:export_kitti"):
 
     folder: Path = ARGUMENT("A generated sequence or dataset with pictures.", metavar="DIR")
     out: Path = OUT()
-    min_visibility: float = MIN_VISIBILITY()
+    min_visibility: float = LEAST_VISIBLE(SMALLER.capitalize(), MIN_VISIBILITY)
 
 
 class MotsOptions(Options, words="export mots", run="export:export_mots"):
@@ -375,7 +376,7 @@ class MotsOptions(Options, words="export mots", run="export:export_mots"):
 
     folder: Path = ARGUMENT("A generated sequence or dataset with the streams left and ids.", metavar="DIR")
     out: Path = OUT()
-    min_visibility: float = MIN_VISIBILITY()
+    min_visibility: float = LEAST_VISIBLE(SMALLER.capitalize(), MIN_VISIBILITY)
 
 
 class WebdatasetOptions(Options, words="export webdataset", run="export:export_webdataset"):
@@ -387,9 +388,7 @@ class WebdatasetOptions(Options, words="export webdataset", run="export:export_w
     sample: Literal["sequence", "frame"] = option(
         "What a sample is: all files of a sequence, or the picture and the labels of a frame.", "sequence")
     seed: int | None = option("Seed of the order of frames. Default: 0.", None, low=0)
-    min_visibility: float | None = option(
-        "Of frames: people of whom a smaller share is visible are ignored. Default: 0.2.", None, low=0, high=1,
-        metavar="SHARE")
+    min_visibility: float | None = LEAST_VISIBLE(f"Of frames: {SMALLER} Default: {MIN_VISIBILITY:g}.", None)
 
 
 class TrajnetOptions(LabelOptions, words="export trajnet", run="export:export_trajnet"):

@@ -25,7 +25,8 @@ from sim.store.own_files import GENERATOR, output_paths, split_and_name
 from sim.store.seal import read_whole_manifest, reject_sealed
 from sim.store.tables import json_text
 from sim.types import Bools, Sequence
-from tracking.export.labelled_pictures import MIN_VISIBILITY, Exported, LabelledPictures, in_turn, labelled_pictures
+from tracking.export import MIN_VISIBILITY
+from tracking.export.labelled_pictures import Exported, LabelledPictures, in_turn, labelled_pictures
 
 PERSON = {"id": 1, "name": "person", "supercategory": "person"}
 

@@ -28,8 +28,8 @@ from sim.store import tables
 from sim.store.own_files import split_and_name
 from sim.store.seal import read_whole_manifest
 from sim.streams import file_name
+from tracking.export import MIN_VISIBILITY
 from tracking.export.labelled_pictures import (
-    MIN_VISIBILITY,
     Exported,
     LabelledPictures,
     in_turn,

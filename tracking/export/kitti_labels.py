@@ -26,8 +26,8 @@ from sim.store.atomic import write_file
 from sim.store.own_files import split_and_name
 from sim.store.seal import reject_sealed
 from sim.types import Array, Ints
+from tracking.export import MIN_VISIBILITY
 from tracking.export.labelled_pictures import (
-    MIN_VISIBILITY,
     Exported,
     LabelledPictures,
     PicturePeople,

@@ -26,11 +26,11 @@ from sim.store.own_files import is_side_file
 from sim.store.seal import read_whole_manifest, reject_sealed
 from sim.streams import file_name
 from sim.types import Array, Bools, Ints, Sequence, Truth
+from tracking.export import MIN_VISIBILITY
 from tracking.recordings.mot_folder import left_pictures
 from tracking.recordings.source import open_source
 
 SEAL = "export.json"
-MIN_VISIBILITY = 0.2  # share of the body: people of whom less is visible are ignored
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ from sim.pictures.stored_pictures import encoded
 from sim.store.atomic import write_inside
 from sim.store.own_files import output_paths
 from sim.streams import PERSON
+from tracking.export import MIN_VISIBILITY
 from tracking.export.coco import run_lengths
 from tracking.export.labelled_pictures import (
-    MIN_VISIBILITY,
     Exported,
     LabelledPictures,
     PicturePeople,

@@ -13,8 +13,8 @@ import numpy as np
 
 from sim.store.atomic import write_inside
 from sim.store.own_files import GENERATOR, output_paths
+from tracking.export import MIN_VISIBILITY
 from tracking.export.labelled_pictures import (
-    MIN_VISIBILITY,
     Exported,
     PicturePeople,
     in_turn,

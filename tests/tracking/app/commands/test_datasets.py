@@ -18,6 +18,13 @@ def walk(tmp_path: Path) -> Path:
     return biwi_walk(tmp_path / "walk")
 
 
+def test_replay_without_the_empty_scene(walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    some = ["--camera", tmp_path / "view.toml", "--duration", "1", "--no-background"]
+    (made,) = answer(capsys, "replay", walk, *some, "--out", tmp_path / "data")["sequences"]
+    assert (Path(made) / "img1").is_dir()
+    assert not (Path(made) / "background").exists()
+
+
 def test_replay_track_score_and_look(walk: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "data"
     made = answer(capsys, "replay", walk, "--camera", tmp_path / "view.toml", "--duration", "4", "--out", out)
