@@ -23,13 +23,14 @@ from scenarios.errors import WorkError
 from scenarios.schema.scenario import Scenario
 from sim.clock import PHYSICS_RATE, SCRIPT_RATE, STEPS, FrameTimes
 from sim.crowd.arrival import NEAR_GOAL, STAND_TIME, has_way, obstacle, stands
-from sim.crowd.forces import AMPLITUDE, COS, SIN, WAYPOINT, Obstacles, PeopleArrays
+from sim.crowd.forces import AMPLITUDE, COS, SIN, Obstacles, PeopleArrays
 from sim.crowd.group_state import GroupState
 from sim.crowd.heading import facings, headings
 from sim.crowd.navigation import Navigator, blocked, scene_of
 from sim.crowd.order_execution import OrderExecution, groups_made
 from sim.crowd.population import BODY_RADIUS, EnteringGroup, draw_population, fluctuations, script_placement
 from sim.crowd.stops import Stops
+from sim.crowd.wayfinding import Wayfinding
 from sim.elementary import cos, length, sin
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.scene.terrain import flight_rows
@@ -68,6 +69,7 @@ class World:
         self.groups = GroupState(self.entering, groups_made(scenario), Navigator(self.scene), slowdown)
         self.orders = OrderExecution(scenario, self.groups, script_placement(scenario, seed, repeat), seed, repeat)
         self.stops = Stops(self.entering, self.groups, self.scene)
+        self.wayfinding = Wayfinding(self.groups)
         stairs = np.column_stack([flight_rows(self.scene), [spec.slowdown for spec in scenario.world.stairs]])
         self.obstacles = Obstacles.of(stairs, np.array(self.scene.walls).reshape(-1, 4), np.array(self.scene.pillars))
         self.space = _space(self.scene)
@@ -142,6 +144,7 @@ class World:
             if tick >= 0:
                 self.group_of[self.columns] = self.groups.group_of[self.columns]
                 changed |= self.orders.advance(tick, t, self.states)
+            changed |= self.wayfinding.advance(t, self.states)
             if changed:
                 self.people = self.groups.rows(self.columns)
             if tick >= 0:
@@ -169,7 +172,6 @@ class World:
             self._read(READ)
             if self.between is not None:
                 self.between[step, self.columns] = self.state
-        self.groups.waypoint[self.columns] = self.people.tag[:, WAYPOINT]
         self.groups.everybody.gait[self.columns] = self.people.gait
 
     def _come_and_go(self, t: float, first: bool) -> None:

@@ -1,0 +1,47 @@
+"""Leads people round walls and through gates (doors, narrow gaps) while the simulation runs, each alone where the group
+cannot walk as one.
+
+A group walks in its formation while all members see its middle, and the middle sees the next point of the way. Else, and
+at a gate, it goes in file: each member walks to the next point of the way that they have not passed. Who does not see
+that point walks to the corner at which the shortest way there begins. Who is ahead waits for the last one, for 20 s; from
+then on each walks alone. At a gate where two people cannot pass each other the sides take turns; in a wider one people
+keep to the right while others come.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim.clock import SCRIPT_RATE
+from sim.crowd.group_state import GroupState
+from sim.types import Array
+
+
+class Wayfinding:
+    """Who walks alone in one running simulation, and where to. State: gate_state: whose turn it is at each gate."""
+
+    def __init__(self, groups: GroupState) -> None:
+        self.groups = groups
+        navigator = groups.navigator
+        self.gate_state = np.zeros((len(navigator.gates), 4))
+        self.since = np.zeros(len(groups.arrays.length))
+
+    def advance(self, t: float, state: Array) -> bool:
+        """Decides at time t (s) who walks alone; returns True if `GroupState.rows` must be called afterwards.
+
+        state (P, 4): x, y, vx, vy by column, nan while absent.
+        """
+        groups, navigator = self.groups, self.groups.navigator
+        if not len(navigator.closed):
+            return False
+        from sim.crowd.wayfinding_kernels import find_ways
+
+        arrays = groups.arrays
+        waits = (groups.queue_of >= 0) | groups.held
+        find_ways(
+            t, state, groups.present, groups.group_of, waits, groups.targets, groups.waypoint, groups.alone,
+            groups.aims, groups.share, groups.gone, arrays.route, arrays.kind, groups.gate, arrays.length, arrays.current,
+            arrays.filing, self.since, arrays.finish, navigator.nodes, navigator.far, navigator.closed, navigator.first,
+            self.gate_state, 1 / SCRIPT_RATE,
+        )  # fmt: skip
+        return True
