@@ -88,7 +88,11 @@ class Navigator:
                     near = [*doors.mean(axis=1), *(g.mean(axis=0) for g in found)]
                     if any(float(length(middle - m)) < NARROW_GAP / 2 for m in near):
                         continue
-                    if not blocked(*(gap + 1e-6 * (gap[::-1] - gap))[:, None], self.walls).any():
+                    if blocked(*(gap + 1e-6 * (gap[::-1] - gap))[:, None], self.walls).any():
+                        continue
+                    across = np.array([foot[1] - end[1], end[0] - foot[0]]) / length(foot - end)
+                    sides = middle + CLEARANCE * np.stack([across, 0 * across, -across])
+                    if (wall_distances(sides[:, None], self.walls) > LEAST_GAP / 2.1).all():  # no corner, nor a wall
                         found.append(gap)
         return np.array(found).reshape(-1, 2, 2)
 
