@@ -61,7 +61,8 @@ STANDING_SPEED = 0.3  # m/s: fastest shift of a group that has arrived; fluctuat
 TURN_DISTANCE = 0.3  # m: nearer to the waypoint the heading is kept
 ARRIVED = 0.25  # m from the end
 HELD_UP_TIME, HELD_UP_SPEED = 2.0, 0.2  # s, m/s: a group so slow for so long near its end is held up by others
-NEAR_GOAL = 2.0  # m: others hold a group up there
+NEAR_GOAL = 2.0  # m: others hold a group up there, and it slows down to turn
+TURNING = 0.4  # share of the speed of a group that has the near next point of its way beside or behind it
 LOOSE = 2.2  # m: a group with a larger radius is not avoided as a whole
 
 
@@ -142,6 +143,8 @@ def _lead_groups(route, kind, length, current, speed, heading, finish, filing, h
             if held_up[g] > HELD_UP_TIME:
                 arrived[g] = True
         if d > TURN_DISTANCE and goal != GATHER and not arrived[g]:
+            if d < NEAR_GOAL and heading[g, 0] * dx + heading[g, 1] * dy < 0.5 * d:
+                pace *= TURNING  # else it walks round the point for ever
             _turn(heading, g, dx / d, dy / d, dt / TURN_TIME)
         if arrived[g] and finish[g] == STAND:
             # It drifts back to the end of its way.
