@@ -86,6 +86,10 @@ class GroupState:
         out = done[self.group_of[columns]] & (self.queue_of[columns] < 0) | self.gone[columns]
         gone = [int(c) for c in columns[out]]
         self.present[gone] = False
+        for g in {int(self.group_of[c]) for c in gone if self.gone[c]}:  # the others are a smaller group
+            stay = [c for c in self.members[g] if self.present[c]]
+            if stay:
+                self.places[stay] -= self.places[stay].mean(axis=0)
         return gone
 
     def go(
