@@ -12,16 +12,18 @@ import numpy as np
 from sim.compiler import njit
 from sim.crowd.forces import END, GATHER, LEAVE, X, Y
 
-# columns of `gate_state` (K, 4): side whose people may pass, 1.0 or -1.0, 0.0 for none; s for which it has been theirs;
+# columns of `gate_state` (K, 4): side whose people may pass, 1.0 or -1.0, 0.0 for none, BOTH; s for which it has been theirs;
 # people within it; side that comes next
 HOLDER, HELD, INSIDE, NEXT = range(4)
 FREE = -1  # no gate
+BOTH = 2.0
 
 NEAR_GATE = 2.0  # m from a gate: a group goes on in file
 PASSED = 0.35  # m behind a gate: a person has passed it
 AIM_BEYOND, AIM_BEFORE = 0.6, 0.45  # m from a gate: where people walk to who are before its opening, or beside it
 EDGE = 0.35  # m that people keep from the sides of a gate, if it is wide enough
-LANES = 1.5  # m: in wider gates people pass each other
+LANES, CROWD_LANES = 1.4, 2.2  # m: in wider gates two people pass each other, and two crowds do
+FEW = 2  # people are no crowd
 DEMAND = 3.0  # m from a gate: people count who want to pass it
 TURN = 5.0  # s after which a gate is the other side's, if people wait there
 ROOM = 1.4  # m from a gate's middle: nearer nobody waits
@@ -190,11 +192,12 @@ def _take_turns(gates, state, wants, side, gate_state, opposed, dt):  # type: ig
             nearest[k, s] = min(nearest[k, s], d)
     for k in range(n):
         opposed[k, 0], opposed[k, 1] = waiting[k, 1] > 0, waiting[k, 0] > 0
-        ux, uy = gates[k, 2] - gates[k, 0], gates[k, 3] - gates[k, 1]
-        if ux * ux + uy * uy > LANES * LANES:
-            gate_state[k, HOLDER] = 2.0  # both
+        _, _, width = _across(gates, k, 0.0, 0.0)
+        if width > CROWD_LANES or (width > LANES and min(waiting[k, 0], waiting[k, 1]) <= FEW):
+            gate_state[k, HOLDER], gate_state[k, HELD] = BOTH, 0.0
             continue
-        h = gate_state[k, HOLDER]
+        h = gate_state[k, HOLDER] if gate_state[k, HOLDER] != BOTH else 0.0
+        gate_state[k, HOLDER] = h
         gate_state[k, HELD] += dt
         if h == 0.0:
             if inside[k] == 0 or gate_state[k, HELD] > 4.0:
@@ -364,7 +367,7 @@ def find_ways(  # type: ignore[no-untyped-def]
             h = gate_state[k, HOLDER]
             along, across, width = _across(gates, k, x, y)
             through = across * side[i] < 0.35 and abs(along) < 0.5 * width
-            may = h == 2.0 or h == side[i] or through
+            may = h == BOTH or h == side[i] or through
             against = opposed[k, 1 if side[i] > 0.0 else 0]
             aim[i, 0], aim[i, 1], moves = _walk_through(gates, k, x, y, side[i], against, may)
             share[i] = 1.0 if moves else 0.0
