@@ -30,7 +30,8 @@ class GroupState:
     column, as the kernels use those who are present; its columns are also places (in the formation, m), group_of (group
     index), mode and queue_of (index of the queue order, -1 in no queue). Also by column: targets (place in the queue, or
     where a held person stands, m); held: True for a person who stays behind at a stop; alone: True for a person who
-    walks alone, at a share of the speed, to the point `aims`, m; waypoint (the first one not passed); gone: True for a
+    walks alone, at a share of the speed, to the point `aims`, m; waypoint (the first one not passed); apart: of people
+    who have lost the group, the first column of those with whom they walk, else -1; gone: True for a
     person who has come to the end of the way alone, and leaves; present; free_speed (m/s). gate (G, W): the gate that
     each waypoint lies in, -1 for none.
     """
@@ -51,7 +52,7 @@ class GroupState:
         self.group_of, self.mode, self.queue_of = self.everybody.tag.T
         self.targets, self.aims, self.share = np.zeros((len(people), 2)), np.zeros((len(people), 2)), np.ones(len(people))
         self.alone, self.gone = np.zeros(len(people), np.bool_), np.zeros(len(people), np.bool_)
-        self.waypoint = np.zeros(len(people), np.int64)
+        self.waypoint, self.apart = np.zeros(len(people), np.int64), np.full(len(people), -1)
         self.gate = np.full(self.arrays.kind.shape, -1)
         for index, columns in self.members.items():
             self.group_of[columns] = index
@@ -186,6 +187,11 @@ class GroupState:
                 self.take_places(columns, standing(len(columns), self.spacing[g]), pos.mean(axis=0), g, pos)
                 changed = True
         return changed
+
+    def intent(self, columns: Ints) -> Ints:
+        """Returns the group that each person in columns (N,) means to be in: a number beyond all groups' for the lost."""
+        apart = self.apart[columns]
+        return np.where(apart >= 0, len(self.arrays.length) + apart, self.group_of[columns])
 
     def rows(self, columns: Ints) -> PeopleArrays:
         """Returns copies of the arrays of the people in columns (N,), for the kernels."""

@@ -11,10 +11,16 @@ keep to the right while others come.
 from __future__ import annotations
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from sim.clock import SCRIPT_RATE
 from sim.crowd.group_state import GroupState
+from sim.crowd.navigation import blocked
+from sim.elementary import length
 from sim.types import Array
+
+WAIT_TIME = 20.0  # s after which nobody waits for the group any more
+TOGETHER = 2.5  # m: people who see each other so near have not lost each other
 
 
 class Wayfinding:
@@ -42,6 +48,25 @@ class Wayfinding:
             t, state, groups.present, groups.group_of, waits, groups.targets, groups.waypoint, groups.alone,
             groups.aims, groups.share, groups.gone, arrays.route, arrays.kind, groups.gate, arrays.length, arrays.current,
             arrays.filing, self.since, arrays.finish, navigator.nodes, navigator.far, navigator.closed, navigator.first,
-            self.gate_state, 1 / SCRIPT_RATE,
+            self.gate_state, 1 / SCRIPT_RATE, WAIT_TIME,
         )  # fmt: skip
+        self._part_the_lost(t, state)
         return True
+
+    def _part_the_lost(self, t: float, state: Array) -> None:
+        """Marks who walks without the group from now on: those whom others of the group waited for in vain.
+
+        The people of a group who see each other within TOGETHER m remain together.
+        """
+        groups, arrays = self.groups, self.groups.arrays
+        groups.apart[:] = -1
+        for g in np.flatnonzero(arrays.filing & (t - self.since >= WAIT_TIME)):
+            columns = [c for c in groups.members[g] if groups.present[c]]
+            pos = state[columns, :2]
+            near = length(pos[:, None] - pos) < TOGETHER
+            near &= ~blocked(*np.broadcast_arrays(pos[:, None], pos[None]), groups.navigator.walls)
+            _, part = connected_components(near, directed=False)
+            if part.max(initial=0):
+                for k in range(1, part.max() + 1):
+                    some = [c for c, p in zip(columns, part, strict=True) if p == k]
+                    groups.apart[some] = min(some)

@@ -31,7 +31,6 @@ ASIDE = 0.6  # cosine of the smallest angle between a gate's axis and the place 
 NEAR_POINT = 0.5  # m: a point of the way counts as passed
 AHEAD, FAR_AHEAD = 1.5, 3.5  # m ahead of the last of the group: people slow down, and wait
 SLOW = 0.4  # share of the speed of those who are ahead
-WAIT_TIME = 20.0  # s after which nobody waits for the group any more
 ROOMY = 2.0  # m from a gate: nearer nobody waits for the group
 LEAVE_RADIUS = 0.8  # m
 
@@ -217,7 +216,7 @@ def _take_turns(gates, state, wants, side, gate_state, opposed, dt):  # type: ig
 def find_ways(  # type: ignore[no-untyped-def]
     t, state, there, group_of, queue_mode, target, waypoint, alone_now, aim, share, alone_gone,
     route, kind, gate, length, current, filing, since, finish,
-    nodes, far, closed, first, gate_state, dt,
+    nodes, far, closed, first, gate_state, dt, wait_time,
 ):  # fmt: skip
     """Decides for all people present how they walk until the next tick of the script.
 
@@ -377,7 +376,7 @@ def find_ways(  # type: ignore[no-untyped-def]
             continue
         w = waypoint[i]
         # Who is ahead waits for the last of the group, but not at a gate.
-        if count[g] > 1 and t - since[g] < WAIT_TIME:
+        if count[g] > 1 and t - since[g] < wait_time:
             gap = 0.0
             dx, dy = route[g, w, 0] - x, route[g, w, 1] - y
             own = sqrt(dx * dx + dy * dy)

@@ -142,7 +142,7 @@ class World:
             self.states[self.columns] = self.state
             changed = self.stops.advance(t, self.states)
             if tick >= 0:
-                self.group_of[self.columns] = self.groups.group_of[self.columns]
+                self.group_of[self.columns] = self.groups.intent(self.columns)
                 changed |= self.orders.advance(tick, t, self.states)
             changed |= self.wayfinding.advance(t, self.states)
             if changed:
