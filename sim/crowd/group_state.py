@@ -50,7 +50,11 @@ class GroupState:
         self.everybody = PeopleArrays.empty(len(people))
         self.places = self.everybody.place
         self.group_of, self.mode, self.queue_of = self.everybody.tag.T
-        self.targets, self.aims, self.share = np.zeros((len(people), 2)), np.zeros((len(people), 2)), np.ones(len(people))
+        self.targets, self.aims, self.share = (
+            np.zeros((len(people), 2)),
+            np.zeros((len(people), 2)),
+            np.ones(len(people)),
+        )
         self.alone, self.gone = np.zeros(len(people), np.bool_), np.zeros(len(people), np.bool_)
         self.waypoint, self.apart = np.zeros(len(people), np.int64), np.full(len(people), -1)
         self.gate = np.full(self.arrays.kind.shape, -1)

@@ -10,7 +10,8 @@ import numpy as np
 from scenarios.schema.geometry import cut_walls
 from scenarios.schema.scenario import WorldSpec
 from sim.elementary import dot, length
-from sim.types import Array, Bools, Ints, Scene
+from sim.geometry.walls import blocked, wall_distances
+from sim.types import Array, Ints, Scene
 
 CLEARANCE = 0.6  # m kept from a wall's end on the way round it
 
@@ -18,32 +19,6 @@ CLEARANCE = 0.6  # m kept from a wall's end on the way round it
 def scene_of(world: WorldSpec) -> Scene:
     """Returns the world of a scenario as the arrays of a Scene, m."""
     return Scene.of(world, *cut_walls(world))
-
-
-def wall_distances(point: Array, wall: Array) -> Array:
-    """Returns the distances (...) m of points (..., 2) m from walls with the two ends `wall` (..., 2, 2) m."""
-    along, off = wall[..., 1, :] - wall[..., 0, :], point - wall[..., 0, :]
-    s = np.clip(dot(off, along) / np.maximum(dot(along, along), 1e-12), 0, 1)
-    return length(off - s[..., None] * along)
-
-
-def blocked(a: Array, b: Array, walls: Array) -> Bools:
-    """Returns flags (...): True where the segment from a to b, (..., 2) m, crosses one of the walls (W, 2, 2) m.
-
-    A segment that only touches a wall, or whose end lies on the wall, does not cross it.
-    """
-    if not len(walls):
-        return np.zeros(a.shape[:-1], dtype=np.bool_)
-    p, q = walls[:, 0], walls[:, 1]
-
-    def side(o: Array, u: Array, v: Array) -> Array:
-        return np.asarray(
-            (u[..., 0] - o[..., 0]) * (v[..., 1] - o[..., 1]) - (u[..., 1] - o[..., 1]) * (v[..., 0] - o[..., 0])
-        )
-
-    a, b = a[..., None, :], b[..., None, :]
-    crosses = (side(a, b, p) * side(a, b, q) < 0) & (side(p, q, a) * side(p, q, b) < 0)
-    return np.asarray(crosses.any(axis=-1))
 
 
 NARROW_GAP, LEAST_GAP = 1.3, 0.42  # m: a gap between walls of such a width is a gate, as a door is
@@ -126,4 +101,6 @@ class Navigator:
         while path[-1] != n:
             path.append(int(self._before[n, path[-1]]))
         nodes = np.array(path[::-1])
-        return np.concatenate([self.nodes[nodes], ends[1:]]), np.append(np.where(nodes < len(self.gates), nodes, -1), -1)
+        return np.concatenate([self.nodes[nodes], ends[1:]]), np.append(
+            np.where(nodes < len(self.gates), nodes, -1), -1
+        )

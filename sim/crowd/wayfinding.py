@@ -15,8 +15,8 @@ from scipy.sparse.csgraph import connected_components
 
 from sim.clock import SCRIPT_RATE
 from sim.crowd.group_state import GroupState
-from sim.crowd.navigation import blocked
 from sim.elementary import length
+from sim.geometry.walls import blocked
 from sim.types import Array
 
 WAIT_TIME = 20.0  # s after which nobody waits for the group any more

@@ -8,8 +8,9 @@ import pytest
 from scenarios.loading.validation import validate
 from scenarios.schema.scenario import Scenario
 from sim.clock import SCRIPT_RATE
-from sim.crowd.navigation import Navigator, blocked
+from sim.crowd.navigation import Navigator
 from sim.crowd.world import World
+from sim.geometry.walls import blocked
 from sim.types import Motion, Scene
 
 TOP = {"kind": "top", "fps": 5, "px_per_m": 10}
