@@ -108,9 +108,8 @@ class GroupArrays(NamedTuple):
         """Returns arrays for g groups with room for w waypoints each: headings (1, 0), all other values 0."""
         return cls(
             np.zeros((g, w, 2)), np.zeros((g, w), np.int64), np.zeros(g, np.int64), np.zeros(g, np.int64), np.zeros(g),
-            np.tile([1.0, 0.0], (g, 1)), np.zeros(g, np.int64), np.zeros(g, np.bool_), np.zeros(g), np.zeros(g, np.bool_),
-            np.zeros((g, 12)),
-            np.zeros((g, 2)), np.arange(g),
+            np.tile([1.0, 0.0], (g, 1)), np.zeros(g, np.int64), np.zeros(g, np.bool_), np.zeros(g),
+            np.zeros(g, np.bool_), np.zeros((g, 12)), np.zeros((g, 2)), np.arange(g),
         )  # fmt: skip
 
     def with_room(self, w: int) -> GroupArrays:

@@ -26,14 +26,14 @@ class GroupState:
 
     State: alive: index of each existing group by name; arrays: the ways of groups, as the kernels use them; next_group:
     index of the next new group; settled: indices of groups that stand in a circle. By group index, also for groups that
-    ended: members (columns), spacing (m), goals (point and "stand", "leave" or "walk"). everybody: all people, by
-    column, as the kernels use those who are present; its columns are also places (in the formation, m), group_of (group
-    index), mode and queue_of (index of the queue order, -1 in no queue). Also by column: targets (place in the queue, or
-    where a held person stands, m); held: True for a person who stays behind at a stop; alone: True for a person who
-    walks alone, at a share of the speed, to the point `aims`, m; waypoint (the first one not passed); apart: of people
-    who have lost the group, the first column of those with whom they walk, else -1; gone: True for a
-    person who has come to the end of the way alone, and leaves; present; free_speed (m/s). gate (G, W): the gate that
-    each waypoint lies in, -1 for none.
+    ended: members (columns), spacing (m), goals (point and "stand", "leave" or "walk"); gate (G, W): the gate that each
+    waypoint lies in, -1 for none. everybody: all people, by column, as the kernels use those who are present; its
+    columns are also places (in the formation, m), group_of (group index), mode and queue_of (index of the queue order,
+    -1 in no queue). Also by column: targets (place in the queue, or where a held person stands, m); held: True for a
+    person who stays behind at a stop; alone: True for a person who walks alone, at `share` of the speed, to the point
+    `aims`, m; waypoint (the first one not passed); apart: of people who have lost the group, the first column of those
+    with whom they walk, else -1; gone: True for a person who has come to the end of the way alone, and leaves; present;
+    free_speed (m/s).
     """
 
     def __init__(self, entering: list[EnteringGroup], new: int, navigator: Navigator, slowdown: float) -> None:
@@ -141,7 +141,8 @@ class GroupState:
         the group's position in m, from which the group turns to its first waypoint.
         """
         self.arrays = arrays = self.arrays.with_room(len(way))
-        self.gate = np.pad(self.gate, ((0, 0), (0, arrays.kind.shape[1] - self.gate.shape[1])), constant_values=-1)
+        room = (0, arrays.kind[0].size - self.gate[0].size)
+        self.gate = np.pad(self.gate, ((0, 0), room), constant_values=-1)
         self.gate[g] = -1
         for k, (point, kind) in enumerate(way):
             arrays.route[g, k], arrays.kind[g, k] = point, kind
@@ -193,7 +194,7 @@ class GroupState:
         return changed
 
     def intent(self, columns: Ints) -> Ints:
-        """Returns the group that each person in columns (N,) means to be in: a number beyond all groups' for the lost."""
+        """Returns the group that each person in columns (N,) means to be in; of the lost a number beyond all groups."""
         apart = self.apart[columns]
         return np.where(apart >= 0, len(self.arrays.length) + apart, self.group_of[columns])
 

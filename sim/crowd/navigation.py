@@ -28,9 +28,9 @@ class Navigator:
     """Finds the shortest ways round walls and through gates in one scene.
 
     gates (K, 2, 2): the ends of doors and of narrow gaps between walls, m. closed (W + K, 4): walls, then gates, as x1,
-    y1, x2, y2: gates block segments like walls, so every way through a gate leads over its middle. nodes (N, 2): middles
-    of gates, then points round the ends of walls, m. far (N, N): length of the shortest way between two nodes in m, inf
-    for none.
+    y1, x2, y2: gates block segments like walls, so every way through a gate leads over its middle. nodes (N, 2):
+    middles of gates, then points round the ends of walls, m. far (N, N): length of the shortest way between two nodes
+    in m, inf for none.
     """
 
     def __init__(self, scene: Scene) -> None:
@@ -63,7 +63,8 @@ class Navigator:
                     near = [*doors.mean(axis=1), *(g.mean(axis=0) for g in found)]
                     if any(float(length(middle - m)) < NARROW_GAP / 2 for m in near):
                         continue
-                    if blocked(*(gap + 1e-6 * (gap[::-1] - gap))[:, None], self.walls).any():
+                    a, b = (gap + 1e-6 * (gap[::-1] - gap))[:, None]
+                    if blocked(a, b, self.walls).any():
                         continue
                     across = np.array([foot[1] - end[1], end[0] - foot[0]]) / length(foot - end)
                     sides = middle + CLEARANCE * np.stack([across, 0 * across, -across])

@@ -1,11 +1,11 @@
 """Leads people round walls and through gates (doors, narrow gaps) while the simulation runs, each alone where the group
 cannot walk as one.
 
-A group walks in its formation while all members see its middle, and the middle sees the next point of the way. Else, and
-at a gate, it goes in file: each member walks to the next point of the way that they have not passed. Who does not see
-that point walks to the corner at which the shortest way there begins. Who is ahead waits for the last one, for 20 s; from
-then on each walks alone. At a gate where two people cannot pass each other the sides take turns; in a wider one people
-keep to the right while others come.
+A group walks in its formation while all members see its middle, and the middle sees the next point of the way. Else,
+and at a gate, it goes in file: each member walks to the next point of the way that they have not passed. Who does not
+see that point walks to the corner at which the shortest way there begins. Who is ahead waits for the last one, for 20
+s; from then on each walks alone. At a gate where two people cannot pass each other, and where two crowds meet at one
+that is no wider than 2.2 m, the sides take turns; in others people keep to the right while others come.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ class Wayfinding:
     def __init__(self, groups: GroupState) -> None:
         self.groups = groups
         navigator = groups.navigator
-        self.gate_state = np.zeros((len(navigator.gates), 4))
+        self.gate_state = np.zeros((len(navigator.gates), 3))
         self.since = np.zeros(len(groups.arrays.length))
 
     def advance(self, t: float, state: Array) -> bool:
@@ -45,10 +45,10 @@ class Wayfinding:
         arrays = groups.arrays
         waits = (groups.queue_of >= 0) | groups.held
         find_ways(
-            t, state, groups.present, groups.group_of, waits, groups.targets, groups.waypoint, groups.alone,
-            groups.aims, groups.share, groups.gone, arrays.route, arrays.kind, groups.gate, arrays.length, arrays.current,
-            arrays.filing, self.since, arrays.finish, navigator.nodes, navigator.far, navigator.closed, navigator.first,
-            self.gate_state, 1 / SCRIPT_RATE, WAIT_TIME,
+            t, state, groups.present, waits, groups.group_of, groups.targets, groups.waypoint, groups.alone,
+            groups.aims, groups.share, groups.gone, arrays.route, arrays.kind, groups.gate, arrays.length,
+            arrays.current, arrays.filing, self.since, arrays.finish, navigator.nodes, navigator.far, navigator.closed,
+            navigator.first, self.gate_state, 1 / SCRIPT_RATE, WAIT_TIME,
         )  # fmt: skip
         self._part_the_lost(t, state)
         return True
@@ -60,11 +60,12 @@ class Wayfinding:
         """
         groups, arrays = self.groups, self.groups.arrays
         groups.apart[:] = -1
-        for g in np.flatnonzero(arrays.filing & (t - self.since >= WAIT_TIME)):
+        for g in np.flatnonzero(arrays.filing & (t - self.since >= WAIT_TIME)).tolist():
             columns = [c for c in groups.members[g] if groups.present[c]]
             pos = state[columns, :2]
             near = length(pos[:, None] - pos) < TOGETHER
-            near &= ~blocked(*np.broadcast_arrays(pos[:, None], pos[None]), groups.navigator.walls)
+            a, b = np.broadcast_arrays(pos[:, None], pos[None])
+            near &= ~blocked(a, b, groups.navigator.walls)
             _, part = connected_components(near, directed=False)
             if part.max(initial=0):
                 for k in range(1, part.max() + 1):

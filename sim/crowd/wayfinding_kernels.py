@@ -1,6 +1,7 @@
-"""Compiled loops of `sim.crowd.wayfinding`: who sees what, who files, who waits at a gate, and where each person walks to.
+"""Compiled loops of `sim.crowd.wayfinding`: who sees what, who files, who waits at a gate, where each person walks to.
 
-Segments `closed` (S, 4) are x1, y1, x2, y2 of walls, then of the K gates; `first` is the index of the first gate.
+Segments `closed` (S, 4) are x1, y1, x2, y2 of walls, then of the K gates, m; `first` is the index of the first gate.
+Arrays of people (P, …) are by column, those of groups (G, …) by index, as in GroupState and GroupArrays.
 """
 
 from __future__ import annotations
@@ -12,23 +13,29 @@ import numpy as np
 from sim.compiler import njit
 from sim.crowd.forces import END, GATHER, LEAVE, X, Y
 
-# columns of `gate_state` (K, 4): side whose people may pass, 1.0 or -1.0, 0.0 for none, BOTH; s for which it has been theirs;
-# people within it; side that comes next
-HOLDER, HELD, INSIDE, NEXT = range(4)
-FREE = -1  # no gate
+# columns of `gate_state` (K, 3): side whose people may pass, 1.0 or -1.0, 0.0 for none, or BOTH; s since this was
+# decided; side that comes next
+HOLDER, HELD, NEXT = range(3)
 BOTH = 2.0
+FREE = -1  # no gate
 
 NEAR_GATE = 2.0  # m from a gate: a group goes on in file
 PASSED = 0.35  # m behind a gate: a person has passed it
 AIM_BEYOND, AIM_BEFORE = 0.6, 0.45  # m from a gate: where people walk to who are before its opening, or beside it
-EDGE = 0.35  # m that people keep from the sides of a gate, if it is wide enough
+EDGE, MIDDLE = 0.35, 0.15  # m that people keep from the sides of a gate, and from its middle while others come
 LANES, CROWD_LANES = 1.4, 2.2  # m: in wider gates two people pass each other, and two crowds do
 FEW = 2  # people are no crowd
 DEMAND = 3.0  # m from a gate: people count who want to pass it
 TURN = 5.0  # s after which a gate is the other side's, if people wait there
-ROOM = 1.4  # m from a gate's middle: nearer nobody waits
+CLEARED = 4.0  # s after which a gate counts as left, whoever is in it
+ROOM, RING = (
+    1.4,
+    0.6,
+)  # m from a gate's middle: nearer nobody waits, and up to RING m beyond, nobody waits before the opening
 ASIDE = 0.6  # cosine of the smallest angle between a gate's axis and the place of a waiting person
+BESIDE = 1.0  # m beside a gate, behind it: it is passed, too
 NEAR_POINT = 0.5  # m: a point of the way counts as passed
+SHORT_CUT = 3.0  # m: and from here if the next one is seen
 AHEAD, FAR_AHEAD = 1.5, 3.5  # m ahead of the last of the group: people slow down, and wait
 SLOW = 0.4  # share of the speed of those who are ahead
 ROOMY = 2.0  # m from a gate: nearer nobody waits for the group
@@ -39,7 +46,7 @@ LEAVE_RADIUS = 0.8  # m
 def sees(ax, ay, bx, by, closed, skip, also):  # type: ignore[no-untyped-def]
     """Returns True if no closed segment but those of indices `skip` and `also` crosses the segment from a to b."""
     for k in range(len(closed)):
-        if k == skip or k == also:
+        if k in (skip, also):
             continue
         px, py, qx, qy = closed[k, 0], closed[k, 1], closed[k, 2], closed[k, 3]
         if (max(px, qx) < min(ax, bx)) or (min(px, qx) > max(ax, bx)):
@@ -57,8 +64,10 @@ def sees(ax, ay, bx, by, closed, skip, also):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def in_sight(points, nodes, closed, first):  # type: ignore[no-untyped-def]
-    """Returns the distances (M, N), m, of points (M, 2) from nodes (N, 2), the first of which are the middles of the gates;
-    inf where a closed segment lies between them."""
+    """Returns the distances (M, N), m, of points (M, 2) from nodes (N, 2); inf if a closed segment is between them.
+
+    The first nodes are the middles of the gates.
+    """
     gates = len(closed) - first
     out = np.full((len(points), len(nodes)), np.inf)
     for i in range(len(points)):
@@ -113,7 +122,7 @@ def first_hop(x, y, tx, ty, gate, nodes, far, closed, first):  # type: ignore[no
 
 @njit(cache=True)
 def _across(gates, k, x, y):  # type: ignore[no-untyped-def]
-    """Returns the distances of (x, y) from gate k, along it from its middle and across it to its left, and its length."""
+    """Returns the distances of (x, y) from the middle of gate k, along it and to its left, and the gate's width, m."""
     ux, uy = gates[k, 2] - gates[k, 0], gates[k, 3] - gates[k, 1]
     width = sqrt(ux * ux + uy * uy)
     ux, uy = ux / width, uy / width
@@ -133,25 +142,24 @@ def _point(gates, k, along, across):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _walk_through(gates, k, x, y, side, opposed, may_pass):  # type: ignore[no-untyped-def]
-    """Returns the point to walk to for a person at (x, y) who wants to pass gate k from `side`, and if they walk at all.
+    """Returns the point to walk to for a person at (x, y) who wants to pass gate k from `side`, and if to walk at all.
 
-    opposed: people come from the other side. may_pass: False if they have the gate.
+    opposed: people come from the other side. may_pass: False if it is not this side's turn.
     """
     along, across, width = _across(gates, k, x, y)
     low = -max(0.5 * width - EDGE, 0.0)
     high = -low
     if opposed and width > LANES:  # keeps to the right
         if side > 0.0:
-            high = 0.0 + min(high, 0.0)
-            low, high = low, -0.15
+            high = -MIDDLE
         else:
-            low, high = 0.15, high
+            low = MIDDLE
     q = min(max(along, low), high)
     before = across * side  # positive: not passed yet
     if not may_pass and before > 0.0:
         d = sqrt(along * along + across * across)
         c = abs(across) / max(d, 1e-9)
-        if d > ROOM and (c < ASIDE or d > ROOM + 0.6):
+        if d > ROOM and (c < ASIDE or d > ROOM + RING):
             return x, y, False
         turn = 1.0 if along > 0.0 else -1.0
         if abs(along) < 0.1:  # to the right
@@ -170,10 +178,13 @@ def _walk_through(gates, k, x, y, side, opposed, may_pass):  # type: ignore[no-u
 
 
 @njit(cache=True)
-def _take_turns(gates, state, wants, side, gate_state, opposed, dt):  # type: ignore[no-untyped-def]
-    """Decides which side may pass each narrow gate. wants (P,): the gate a person walks to, FREE for none; side (P,): from
-    which. Overwrites opposed (K, 2): flags, people wait on the right side, on the left."""
+def _take_turns(gates, state, wants, side, gate_state, dt):  # type: ignore[no-untyped-def]
+    """Decides which side may pass each narrow gate; returns flags (K, 2): people come from the left, from the right.
+
+    wants (P,): the gate to which a person walks, FREE for none. side (P,): from its left (1.0) or right (-1.0). dt: s.
+    """
     n = len(gates)
+    opposed = np.zeros((n, 2), np.bool_)
     waiting = np.zeros((n, 2), np.int64)
     nearest = np.full((n, 2), np.inf)
     inside = np.zeros(n, np.int64)
@@ -199,7 +210,7 @@ def _take_turns(gates, state, wants, side, gate_state, opposed, dt):  # type: ig
         gate_state[k, HOLDER] = h
         gate_state[k, HELD] += dt
         if h == 0.0:
-            if inside[k] == 0 or gate_state[k, HELD] > 4.0:
+            if inside[k] == 0 or gate_state[k, HELD] > CLEARED:
                 if waiting[k, 0] + waiting[k, 1] == 0:
                     continue
                 to = gate_state[k, NEXT]
@@ -210,191 +221,196 @@ def _take_turns(gates, state, wants, side, gate_state, opposed, dt):  # type: ig
             own, other = waiting[k, 1 if h > 0.0 else 0], waiting[k, 0 if h > 0.0 else 1]
             if own == 0 or (other > 0 and gate_state[k, HELD] > TURN):
                 gate_state[k, HOLDER], gate_state[k, HELD], gate_state[k, NEXT] = 0.0, 0.0, -h
+    return opposed
+
+
+@njit(cache=True)
+def _near(gates, k, x, y, reach):  # type: ignore[no-untyped-def]
+    """Returns True if (x, y) is within `reach` m of gate k."""
+    along, across, width = _across(gates, k, x, y)
+    beside = max(abs(along) - 0.5 * width, 0.0)
+    return beside * beside + across * across <= reach * reach
+
+
+@njit(cache=True)
+def _sees_point(x, y, point, k, closed, first):  # type: ignore[no-untyped-def]
+    """Returns True if a point (2,) of a way, in the middle of gate k or of none (FREE), is seen from (x, y)."""
+    return sees(x, y, point[X], point[Y], closed, first + k if k >= 0 else -1, -1)
+
+
+@njit(cache=True)
+def _middles(state, walks, group_of, groups):  # type: ignore[no-untyped-def]
+    """Returns number (G,) and mean place (G, 2) of the people of each group who walk."""
+    count, middle = np.zeros(groups, np.int64), np.zeros((groups, 2))
+    for i in range(len(state)):
+        if walks[i]:
+            g = group_of[i]
+            count[g] += 1
+            middle[g, X] += state[i, X]
+            middle[g, Y] += state[i, Y]
+    for g in range(groups):
+        if count[g]:
+            middle[g] /= count[g]
+    return count, middle
+
+
+@njit(cache=True)
+def _start_files(  # type: ignore[no-untyped-def]
+    t, state, walks, group_of, count, middle, waypoint, route, kind, gate, length, current, filing, since, closed, first
+):
+    """Lets groups go in file from time t (s) that are at a gate, or of which one does not see the middle, or the middle
+    not the next point of the way."""
+    for g in range(len(length)):
+        w = current[g]
+        if count[g] and length[g] and not filing[g] and kind[g, w] != GATHER:
+            k = gate[g, w]
+            at_gate = k >= 0 and _near(closed[first:], k, middle[g, X], middle[g, Y], NEAR_GATE)
+            if at_gate or not _sees_point(middle[g, X], middle[g, Y], route[g, w], k, closed, first):
+                filing[g], since[g] = True, t
+    for i in range(len(state)):
+        g = group_of[i]
+        if walks[i] and not filing[g]:
+            waypoint[i] = current[g]
+            if kind[g, current[g]] != GATHER and not _sees_point(
+                state[i, X], state[i, Y], middle[g], FREE, closed, first
+            ):
+                filing[g], since[g] = True, t
+    for i in range(len(state)):
+        if walks[i] and filing[group_of[i]] and since[group_of[i]] == t:
+            waypoint[i] = current[group_of[i]]
+
+
+@njit(cache=True)
+def _passes(x, y, g, w, route, gate, closed, first):  # type: ignore[no-untyped-def]
+    """Returns True if a person at (x, y) has passed point w of the way of group g, which is not its last."""
+    k = gate[g, w]
+    if k >= 0:
+        along, across, width = _across(closed[first:], k, x, y)
+        _, beyond, _ = _across(closed[first:], k, route[g, w + 1, X], route[g, w + 1, Y])
+        return across * (1.0 if beyond > 0.0 else -1.0) > PASSED and abs(along) < 0.5 * width + BESIDE
+    dx, dy = route[g, w, X] - x, route[g, w, Y] - y
+    d2 = dx * dx + dy * dy
+    if d2 <= NEAR_POINT * NEAR_POINT:
+        return True
+    return d2 <= SHORT_CUT * SHORT_CUT and _sees_point(x, y, route[g, w + 1], gate[g, w + 1], closed, first)
+
+
+@njit(cache=True)
+def _end_files(  # type: ignore[no-untyped-def]
+    state, walks, group_of, count, middle, waypoint, route, gate, current, filing, closed, first
+):
+    """Lets groups walk together again whose people have passed the same points and see each other, off their gate."""
+    groups = len(current)
+    least, most = np.full(groups, 1 << 30), np.full(groups, -1)
+    for i in range(len(state)):
+        if walks[i]:
+            g = group_of[i]
+            least[g], most[g] = min(least[g], waypoint[i]), max(most[g], waypoint[i])
+    together = np.zeros(groups, np.bool_)
+    for g in range(groups):
+        if filing[g] and count[g]:
+            current[g] = least[g]
+            w, k = least[g], gate[g, least[g]]
+            x, y = middle[g, X], middle[g, Y]
+            at_gate = k >= 0 and _near(closed[first:], k, x, y, NEAR_GATE + 0.5)
+            together[g] = least[g] == most[g] and not at_gate and _sees_point(x, y, route[g, w], k, closed, first)
+    for i in range(len(state)):
+        if walks[i] and together[group_of[i]]:
+            together[group_of[i]] = _sees_point(state[i, X], state[i, Y], middle[group_of[i]], FREE, closed, first)
+    for g in range(groups):
+        filing[g] = filing[g] and not together[g]
+
+
+@njit(cache=True)
+def _share_of_waiting(i, state, walks, group_of, waypoint, route, gates):  # type: ignore[no-untyped-def]
+    """Returns the share of the speed of person i, who is ahead of others of the group and waits for them."""
+    g, w, x, y = group_of[i], waypoint[i], state[i, X], state[i, Y]
+    own, gap = (route[g, w, X] - x) ** 2 + (route[g, w, Y] - y) ** 2, 0.0
+    for j in range(len(state)):
+        if j != i and walks[j] and group_of[j] == g:
+            other = (route[g, w, X] - state[j, X]) ** 2 + (route[g, w, Y] - state[j, Y]) ** 2
+            if waypoint[j] < w or (waypoint[j] == w and other > own):
+                gap = max(gap, sqrt((state[j, X] - x) ** 2 + (state[j, Y] - y) ** 2))
+    if gap <= AHEAD:
+        return 1.0
+    if gap > FAR_AHEAD:
+        clear = True
+        for k in range(len(gates)):
+            clear = clear and not _near(gates, k, x, y, ROOMY)
+        if clear:
+            return 0.0
+    return SLOW
 
 
 @njit(cache=True)
 def find_ways(  # type: ignore[no-untyped-def]
-    t, state, there, group_of, queue_mode, target, waypoint, alone_now, aim, share, alone_gone,
+    t, state, there, waits, group_of, target, waypoint, alone, aim, share, gone,
     route, kind, gate, length, current, filing, since, finish,
     nodes, far, closed, first, gate_state, dt, wait_time,
 ):  # fmt: skip
-    """Decides for all people present how they walk until the next tick of the script.
+    """Decides at time t (s) how all people walk for the next dt s.
 
-    state (P, 4), there (P,), group_of (P,): as in World, by column. queue_mode (P,): True for people who walk to `target`
-    (P, 2), m. Updated: waypoint (P,); filing (G,), since (G,) s, current (G,). Overwritten: alone_now (P,): IN_GROUP, TO_TARGET
-    or ALONE; aim (P, 2) m and share (P,) of the speed, for people who walk alone; alone_gone (P,): True for who has come
-    to the end of the way alone, and leaves.
+    state (P, 4), m, m/s; there (P,): who is present. waits (P,): True for people who walk to `target` (P, 2), m, and
+    stand there. wait_time: s for which a group in file waits for its last. Overwritten: alone (P,), and for those who
+    walk alone aim (P, 2), m, and share (P,) of the speed; gone (P,): True for who has come to the end of the way alone
+    and leaves. Updated: waypoint (P,), filing (G,), since (G,), s, current (G,), gate_state (K, 3).
     """
-    people, groups, gates = len(state), len(length), closed[first:]
-    count, mx, my = np.zeros(groups, np.int64), np.zeros(groups), np.zeros(groups)
+    people, gates, walks = len(state), closed[first:], there & ~waits
+    count, middle = _middles(state, walks, group_of, len(length))
+    _start_files(
+        t, state, walks, group_of, count, middle, waypoint, route, kind, gate, length, current, filing, since, closed,
+        first,
+    )  # fmt: skip
     for i in range(people):
-        alone_gone[i] = False
-        if there[i] and not queue_mode[i]:
-            g = group_of[i]
-            count[g] += 1
-            mx[g] += state[i, X]
-            my[g] += state[i, Y]
-    for g in range(groups):
-        if count[g]:
-            mx[g] /= count[g]
-            my[g] /= count[g]
-    # Which groups go in file. A group of which all see its middle, and whose middle sees the next point, walks together.
-    together = np.ones(groups, np.bool_)
-    least, most = np.full(groups, 1 << 30), np.full(groups, -1)
-    for g in range(groups):
-        if not count[g] or not length[g]:
-            continue
-        w = current[g]
-        k = gate[g, w]
-        if not filing[g]:
-            if kind[g, w] == GATHER:
-                continue
-            if k >= 0:
-                along, across, width = _across(gates, k, mx[g], my[g])
-                beside = max(abs(along) - 0.5 * width, 0.0)
-                together[g] = beside * beside + across * across > NEAR_GATE * NEAR_GATE
-            if not sees(mx[g], my[g], route[g, w, 0], route[g, w, 1], closed, first + k if k >= 0 else -1, -1):
-                together[g] = False
-    for i in range(people):
-        if not there[i] or queue_mode[i]:
-            continue
         g = group_of[i]
-        if not filing[g]:
-            waypoint[i] = current[g]
-            if count[g] > 1 and kind[g, current[g]] != GATHER:
-                if not sees(state[i, X], state[i, Y], mx[g], my[g], closed, -1, -1):
-                    together[g] = False
-    for g in range(groups):
-        if not filing[g] and not together[g]:
-            filing[g] = True
-            since[g] = t
-    # Who files passes the points of the way alone.
-    wants, side = np.full(people, FREE), np.zeros(people)
-    lost = np.zeros(people, np.bool_)
+        while walks[i] and filing[g] and waypoint[i] < length[g] - 1:
+            if not _passes(state[i, X], state[i, Y], g, waypoint[i], route, gate, closed, first):
+                break
+            waypoint[i] += 1
+    _end_files(state, walks, group_of, count, middle, waypoint, route, gate, current, filing, closed, first)
+    wants, side, lost = np.full(people, FREE), np.zeros(people), np.zeros(people, np.bool_)
     for i in range(people):
-        alone_now[i] = False
+        alone[i] = gone[i] = False
         if not there[i]:
             continue
-        g = group_of[i]
-        x, y = state[i, X], state[i, Y]
-        if queue_mode[i] or not filing[g]:
-            continue
-        last = length[g] - 1
-        w = min(waypoint[i], last)
-        while w < last:
-            k = gate[g, w]
-            if k >= 0:
-                along, across, width = _across(gates, k, x, y)
-                _, to, _ = _across(gates, k, route[g, w + 1, 0], route[g, w + 1, 1])
-                ahead = 1.0 if to > 0.0 else -1.0
-                if not (across * ahead > PASSED and abs(along) < 0.5 * width + 1.0):
-                    break
-            else:
-                dx, dy = route[g, w, 0] - x, route[g, w, 1] - y
-                if dx * dx + dy * dy > NEAR_POINT * NEAR_POINT:
-                    k = gate[g, w + 1]
-                    if not sees(x, y, route[g, w + 1, 0], route[g, w + 1, 1], closed, first + k if k >= 0 else -1, -1):
-                        break
-                    if dx * dx + dy * dy > 9.0:
-                        break
-            w += 1
-        waypoint[i] = w
-        least[g], most[g] = min(least[g], w), max(most[g], w)
-    for g in range(groups):
-        if filing[g] and count[g]:
-            current[g] = least[g]
-            w = current[g]
-            k = gate[g, w]
-            again = least[g] == most[g]
-            if k >= 0:
-                along, across, width = _across(gates, k, mx[g], my[g])
-                beside = max(abs(along) - 0.5 * width, 0.0)
-                again = again and beside * beside + across * across > (NEAR_GATE + 0.5) ** 2
-            own = first + k if k >= 0 else -1
-            together[g] = again and sees(mx[g], my[g], route[g, w, 0], route[g, w, 1], closed, own, -1)
-    for i in range(people):
-        if there[i] and not queue_mode[i] and filing[group_of[i]]:
-            g = group_of[i]
-            if not sees(state[i, X], state[i, Y], mx[g], my[g], closed, -1, -1):
-                together[g] = False
-    for g in range(groups):
-        if filing[g] and together[g]:
-            filing[g] = False
-    # Where everybody walks to who does not walk in a formation.
-    for i in range(people):
-        if not there[i]:
-            continue
-        g = group_of[i]
-        x, y = state[i, X], state[i, Y]
-        w, k = waypoint[i], FREE
-        if queue_mode[i]:
-            tx, ty = target[i, 0], target[i, 1]
-        elif filing[g]:
-            tx, ty, k = route[g, w, 0], route[g, w, 1], gate[g, w]
-        elif kind[g, current[g]] == GATHER:
-            tx, ty = route[g, current[g], 0], route[g, current[g], 1]
+        g, x, y, k = group_of[i], state[i, X], state[i, Y], FREE
+        alone[i] = walks[i] and filing[g]
+        if waits[i]:
+            tx, ty = target[i, X], target[i, Y]
+        elif filing[g] or kind[g, current[g]] == GATHER:
+            w = waypoint[i] if filing[g] else current[g]
+            tx, ty, k = route[g, w, X], route[g, w, Y], gate[g, w]
         else:
             continue
-        alone = filing[g] and not queue_mode[i]
         if not sees(x, y, tx, ty, closed, first + k if k >= 0 else -1, -1):
             n = first_hop(x, y, tx, ty, k, nodes, far, closed, first)
             if n >= 0:
-                alone = True
-                lost[i] = True
-                tx, ty = nodes[n, 0], nodes[n, 1]
-                k = n if n < len(gates) else FREE
-        if not alone:
-            continue
-        alone_now[i] = True
-        aim[i, 0], aim[i, 1], share[i] = tx, ty, 1.0
-        if k >= 0:
+                alone[i] = lost[i] = True
+                tx, ty, k = nodes[n, X], nodes[n, Y], n if n < len(gates) else FREE
+        aim[i, X], aim[i, Y], share[i] = tx, ty, 1.0
+        if alone[i] and k >= 0:
             wants[i] = k
             _, across, _ = _across(gates, k, x, y)
+            if not lost[i] and waypoint[i] < length[g] - 1:  # also for who stands behind the gate already
+                _, beyond, _ = _across(gates, k, route[g, waypoint[i] + 1, X], route[g, waypoint[i] + 1, Y])
+                across = -beyond
             side[i] = 1.0 if across > 0.0 else -1.0
-            if not lost[i] and w < length[g] - 1:
-                _, to, _ = _across(gates, k, route[g, w + 1, 0], route[g, w + 1, 1])
-                side[i] = -1.0 if to > 0.0 else 1.0
-    opposed = np.zeros((len(gates), 2), np.bool_)
-    _take_turns(gates, state, wants, side, gate_state, opposed, dt)
+    opposed = _take_turns(gates, state, wants, side, gate_state, dt)
     for i in range(people):
-        if not there[i] or not alone_now[i]:
+        if not there[i] or not alone[i]:
             continue
-        k = wants[i]
-        x, y = state[i, X], state[i, Y]
-        waits = False
+        g, k, x, y, may = group_of[i], wants[i], state[i, X], state[i, Y], True
         if k >= 0:
-            h = gate_state[k, HOLDER]
             along, across, width = _across(gates, k, x, y)
-            through = across * side[i] < 0.35 and abs(along) < 0.5 * width
-            may = h == BOTH or h == side[i] or through
+            within = across * side[i] < PASSED and abs(along) < 0.5 * width
+            may = within or gate_state[k, HOLDER] == BOTH or gate_state[k, HOLDER] == side[i]
             against = opposed[k, 1 if side[i] > 0.0 else 0]
-            aim[i, 0], aim[i, 1], moves = _walk_through(gates, k, x, y, side[i], against, may)
+            aim[i, X], aim[i, Y], moves = _walk_through(gates, k, x, y, side[i], against, may)
             share[i] = 1.0 if moves else 0.0
-            waits = not may
-        g = group_of[i]
-        if waits or queue_mode[i] or not filing[g] or lost[i]:
+        if not may or lost[i] or waits[i] or count[g] == 1:
             continue
         w = waypoint[i]
-        # Who is ahead waits for the last of the group, but not at a gate.
-        if count[g] > 1 and t - since[g] < wait_time:
-            gap = 0.0
-            dx, dy = route[g, w, 0] - x, route[g, w, 1] - y
-            own = sqrt(dx * dx + dy * dy)
-            for j in range(people):
-                if there[j] and group_of[j] == g and j != i and not queue_mode[j]:
-                    ex, ey = route[g, w, 0] - state[j, X], route[g, w, 1] - state[j, Y]
-                    if waypoint[j] < w or (waypoint[j] == w and sqrt(ex * ex + ey * ey) > own):
-                        gap = max(gap, sqrt((state[j, X] - x) ** 2 + (state[j, Y] - y) ** 2))
-            if gap > AHEAD:
-                share[i] *= SLOW
-            if gap > FAR_AHEAD:
-                clear = True
-                for m in range(len(gates)):
-                    along, across, width = _across(gates, m, x, y)
-                    beside = max(abs(along) - 0.5 * width, 0.0)
-                    clear = clear and beside * beside + across * across > ROOMY * ROOMY
-                if clear:
-                    share[i] = 0.0
-        elif w == length[g] - 1 and kind[g, w] == END and finish[g] == LEAVE and count[g] > 1:
-            dx, dy = route[g, w, 0] - x, route[g, w, 1] - y
-            alone_gone[i] = dx * dx + dy * dy < LEAVE_RADIUS * LEAVE_RADIUS
+        if t - since[g] < wait_time:
+            share[i] *= _share_of_waiting(i, state, walks, group_of, waypoint, route, gates)
+        elif w == length[g] - 1 and kind[g, w] == END and finish[g] == LEAVE:
+            gone[i] = (route[g, w, X] - x) ** 2 + (route[g, w, Y] - y) ** 2 < LEAVE_RADIUS * LEAVE_RADIUS

@@ -115,7 +115,7 @@ class World:
         groups, arrays = self.groups, self.groups.arrays
         waits = arrays.arrived | (arrays.kind[np.arange(len(arrays.kind)), arrays.current] == GATHER)
         waits[self.stops.standing()] = True
-        return ~(waits[groups.group_of] | (groups.queue_of >= 0) | groups.held)
+        return np.asarray(~(waits[groups.group_of] | (groups.queue_of >= 0) | groups.held))
 
     def _never_arrive(self, states: Array) -> Iterator[NeverArrives]:
         """Yields the groups that do not reach their goal. states (C, P, 4): at the ticks, by column."""

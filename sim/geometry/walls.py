@@ -46,4 +46,4 @@ def distances_round(a: Array, b: Array, walls: Array) -> Array:
     round_ends = length(a[..., None, :] - ends) + length(b[..., None, :] - ends)
     longer = round_ends.reshape(*straight.shape, len(walls), 2).min(axis=-1)
     between = np.stack([blocked(a, b, wall[None]) for wall in walls], axis=-1)
-    return np.maximum(straight, np.where(between, longer, 0.0).max(axis=-1))
+    return np.asarray(np.maximum(straight, np.where(between, longer, 0.0).max(axis=-1)))

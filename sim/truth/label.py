@@ -112,11 +112,13 @@ def _moving(rows: MotionRows, immobile: tuple[Immobile, ...], rate: float) -> Mo
     """Returns the rows without those of people who stand still on the way: who is stuck is in no queue."""
     kept = np.ones(len(rows.frame), np.bool_)
     for one in immobile:
-        kept[slice(*rows.find(one.person - 1, np.rint(np.array([one.start, one.end]) * rate).astype(int) + [0, 1]))] = (
-            False
-        )
-    some = (rows.frame, rows.column, rows.pos, rows.vel, rows.group)
-    return rows if kept.all() else MotionRows(*(part[kept] for part in some), rows.length)
+        first, last = round(one.start * rate), round(one.end * rate)
+        kept[int(rows.find(one.person - 1, first)) : int(rows.find(one.person - 1, last + 1))] = False
+    if kept.all():
+        return rows
+    return MotionRows(
+        rows.frame[kept], rows.column[kept], rows.pos[kept], rows.vel[kept], rows.group[kept], rows.length
+    )
 
 
 def _events_in_frames(
