@@ -24,12 +24,14 @@ TOGETHER = 2.5  # m: people who see each other so near have not lost each other
 
 
 class Wayfinding:
-    """Who walks alone in one running simulation, and where to. State: gate_state: whose turn it is at each gate."""
+    """Who walks alone in one running simulation, and where to. State: gate_state: whose turn it is at each gate;
+    since (G,): s since which each group goes in file; parted: people have lost their groups."""
 
     def __init__(self, groups: GroupState) -> None:
         self.groups = groups
         navigator = groups.navigator
         self.gate_state = np.zeros((len(navigator.gates), 3))
+        self.parted = False
         self.since = np.zeros(len(groups.arrays.length))
 
     def advance(self, t: float, state: Array) -> bool:
@@ -44,14 +46,15 @@ class Wayfinding:
 
         arrays = groups.arrays
         waits = (groups.queue_of >= 0) | groups.held
-        find_ways(
+        changed, late = find_ways(
             t, state, groups.present, waits, groups.group_of, groups.targets, groups.waypoint, groups.alone,
             groups.aims, groups.share, groups.gone, arrays.route, arrays.kind, groups.gate, arrays.length,
             arrays.current, arrays.filing, self.since, arrays.finish, navigator.nodes, navigator.far, navigator.closed,
             navigator.first, self.gate_state, 1 / SCRIPT_RATE, WAIT_TIME,
         )  # fmt: skip
-        self._part_the_lost(t, state)
-        return True
+        if late or self.parted:
+            self._part_the_lost(t, state)
+        return bool(changed)
 
     def _part_the_lost(self, t: float, state: Array) -> None:
         """Marks who walks without the group from now on: those whom others of the group waited for in vain.
@@ -60,6 +63,7 @@ class Wayfinding:
         """
         groups, arrays = self.groups, self.groups.arrays
         groups.apart[:] = -1
+        self.parted = False
         for g in np.flatnonzero(arrays.filing & (t - self.since >= WAIT_TIME)).tolist():
             columns = [c for c in groups.members[g] if groups.present[c]]
             pos = state[columns, :2]
@@ -68,6 +72,7 @@ class Wayfinding:
             near &= ~blocked(a, b, groups.navigator.walls)
             _, part = connected_components(near, directed=False)
             if part.max(initial=0):
+                self.parted = True
                 for k in range(1, part.max() + 1):
                     some = [c for c, p in zip(columns, part, strict=True) if p == k]
                     groups.apart[some] = min(some)

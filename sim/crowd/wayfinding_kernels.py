@@ -351,11 +351,12 @@ def find_ways(  # type: ignore[no-untyped-def]
     """Decides at time t (s) how all people walk for the next dt s.
 
     state (P, 4), m, m/s; there (P,): who is present. waits (P,): True for people who walk to `target` (P, 2), m, and
-    stand there. wait_time: s for which a group in file waits for its last. Overwritten: alone (P,), and for those who
+    stand there. wait_time: s for which a group in file waits for its last. Returns whether somebody walks alone, or did
+    before, and whether a group has waited so long. Overwritten: alone (P,), and for those who
     walk alone aim (P, 2), m, and share (P,) of the speed; gone (P,): True for who has come to the end of the way alone
     and leaves. Updated: waypoint (P,), filing (G,), since (G,), s, current (G,), gate_state (K, 3).
     """
-    people, gates, walks = len(state), closed[first:], there & ~waits
+    people, gates, walks, changed = len(state), closed[first:], there & ~waits, alone.any()
     count, middle = _middles(state, walks, group_of, len(length))
     _start_files(
         t, state, walks, group_of, count, middle, waypoint, route, kind, gate, length, current, filing, since, closed,
@@ -395,6 +396,11 @@ def find_ways(  # type: ignore[no-untyped-def]
                 _, beyond, _ = _across(gates, k, route[g, waypoint[i] + 1, X], route[g, waypoint[i] + 1, Y])
                 across = -beyond
             side[i] = 1.0 if across > 0.0 else -1.0
+    late = False
+    for g in range(len(length)):
+        late = late or (filing[g] and t - since[g] >= wait_time)
+    if not alone.any():
+        return changed, late
     opposed = _take_turns(gates, state, wants, side, gate_state, dt)
     for i in range(people):
         if not there[i] or not alone[i]:
@@ -414,3 +420,4 @@ def find_ways(  # type: ignore[no-untyped-def]
             share[i] *= _share_of_waiting(i, state, walks, group_of, waypoint, route, gates)
         elif w == length[g] - 1 and kind[g, w] == END and finish[g] == LEAVE:
             gone[i] = (route[g, w, X] - x) ** 2 + (route[g, w, Y] - y) ** 2 < LEAVE_RADIUS * LEAVE_RADIUS
+    return True, late

@@ -101,7 +101,8 @@ class World:
         free = np.empty((needed, people), np.bool_)
         shown = states[: len(frames.tick)] if self.between is None else np.empty((len(frames.tick), people, 4))
         for tick, (state, group) in enumerate(self.ticks(needed)):
-            states[tick], intents[tick], free[tick] = state, group, self._free_to_walk()
+            states[tick], intents[tick] = state, group
+            free[tick] = free[tick - 1] if tick % SCRIPT_RATE else self._free_to_walk()  # looked at once a second
             if tick and self.between is not None:  # what lies between two ticks is known at the second one
                 shown[frames.within(tick - 1)] = frames.states(tick - 1, self.between)
         lost = tuple(self._never_arrive(states[:count]))
