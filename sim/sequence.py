@@ -164,5 +164,5 @@ def observe(
         load_people=named, source=source, bare=bare,
         load_owners=lambda: sensed()[1],
         load_background=None if renderer is None else background, load_pixels=None if renderer is None else pixels,
-        load_light=light, never_arrive=motion.never_arrive,
+        load_light=light, never_arrive=motion.never_arrive, immobile=motion.immobile,
     )  # fmt: skip

@@ -229,6 +229,23 @@ class NeverArrives:
         return f"group {self.group} never arrives: {ways[self.no_way]} {places}; in the way: {self.obstacle}"
 
 
+@dataclass(frozen=True, slots=True)
+class Immobile:
+    """A person of a simulated crowd who stood still for 10 s or more on the way, without an order to wait. person: id.
+    start, end: s after the first recorded frame. pos: the place at the start, x, y in m."""
+
+    person: int
+    start: float
+    end: float
+    pos: tuple[float, float]
+
+    @property
+    def words(self) -> str:
+        """The finding in one line."""
+        at = f"from {self.start:.1f} s at {list(self.pos)}"
+        return f"person {self.person} stood still for {self.end - self.start:.1f} s on the way, {at}"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class States(Frozen):
     """The states of a crowd from which groups and events are measured: C ticks at `rate` per s from t = 0, P people.
@@ -251,7 +268,8 @@ class Motion(Frozen):
     (T, P): rad; nan while absent. present (T, P): True while in the scene. intent (T, P): number of the group that the
     script assigns the person to (a number of its own for a person alone, -1 while absent). height, width, depth (P,):
     of the body, m. free_speed (P,): walking speed alone, m/s. orders: of the script. measured: states from which the
-    truth is measured; None: the frames themselves. never_arrive: groups that do not reach their goal."""
+    truth is measured; None: the frames themselves. never_arrive: groups that do not reach their goal. immobile:
+    people who stood still on the way."""
 
     name: str
     seed: int
@@ -270,6 +288,7 @@ class Motion(Frozen):
     orders: tuple[Order, ...] = ()
     measured: States | None = None
     never_arrive: tuple[NeverArrives, ...] = ()
+    immobile: tuple[Immobile, ...] = ()
 
     def states(self) -> States:
         """Returns the states from which the truth is measured."""
@@ -442,6 +461,7 @@ class Sequence:
     load_pixels: Callable[[int], PixelTruth] | None = None
     load_light: Callable[[], Array] | None = None
     never_arrive: tuple[NeverArrives, ...] = ()
+    immobile: tuple[Immobile, ...] = ()
 
     def __iter__(self) -> Iterator[Frame]:
         return self.frames()

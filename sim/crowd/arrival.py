@@ -12,10 +12,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from sim.crowd.navigation import blocked, wall_distances
 from sim.crowd.population import BODY_RADIUS
 from sim.elementary import length
-from sim.types import Array, Ints, Scene
+from sim.geometry.walls import blocked, wall_distances
+from sim.types import Array, Bools, Immobile, Ints, Scene
 
 CELL = 0.05  # m
 MOST_CELLS = 16_000_000  # in larger worlds only standing is found
@@ -97,6 +97,32 @@ def _crossed(place: Array, goal: Array, wall: Array) -> bool:
 
 def _numbers(values: object) -> str:
     return str([round(value, 2) for value in np.ravel(np.asarray(values, float)).tolist()])
+
+
+def immobile_people(pos: Array, free: Bools, rate: float) -> tuple[Immobile, ...]:
+    """Returns the people who stay within STAND_MOVE along x and y for STAND_TIME or more, while they are free to walk.
+
+    pos (C, P, 2): m, at C ticks, `rate` per s; nan while absent. free (C, P): False while something bids them wait.
+    """
+    from scipy.ndimage import maximum_filter1d, minimum_filter1d
+
+    width = round(STAND_TIME * rate) + 1
+    if len(pos) < width:
+        return ()
+    there = free & np.isfinite(pos[..., 0])
+    high, low = (np.where(there[..., None], pos, away) for away in (np.inf, -np.inf))
+    half, middle = width // 2, {"size": width, "axis": 0, "mode": "nearest"}
+    spread = maximum_filter1d(high, **middle) - minimum_filter1d(low, **middle)
+    still = (spread < STAND_MOVE).all(axis=2)
+    still[:half] = still[len(still) - half :] = False
+    still = maximum_filter1d(still, **middle)
+    found = []
+    for p in np.flatnonzero(still.any(axis=0)):
+        edge = np.flatnonzero(np.diff(still[:, p], prepend=False, append=False))
+        for first, end in edge.reshape(-1, 2).tolist():
+            x, y = pos[first, p].tolist()
+            found.append(Immobile(int(p) + 1, first / rate, (end - 1) / rate, (round(x, 2), round(y, 2))))
+    return tuple(found)
 
 
 def stands(states: Array, rate: float) -> bool:

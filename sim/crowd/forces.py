@@ -27,13 +27,13 @@ from sim.types import Array, Bools, Ints
 # columns of `state` (N, 4): position in m, velocity in m/s
 X, Y, VX, VY = range(4)
 
-# columns of PeopleArrays.tag (N, 4)
-GROUP, MODE, QUEUE, WAYPOINT = range(4)
-# MODE of a person: walks with the group, or walks to a place in a queue
-IN_GROUP, TO_TARGET = range(2)
+# columns of PeopleArrays.tag (N, 3)
+GROUP, MODE, QUEUE = range(3)
+# MODE of a person: walks with the group, to a place in a queue, or alone to the next point of the own way
+IN_GROUP, TO_TARGET, ALONE = range(3)
 
-# kinds of a waypoint: pass it, pass it in single file (a door), wait there for the whole group, end of the way
-PASS, NARROW, GATHER, END = range(4)
+# kinds of a waypoint: pass it, wait there for the whole group, end of the way
+PASS, GATHER, END = range(3)
 # what a group does at the end of its way
 STAND, LEAVE = range(2)
 
@@ -86,12 +86,14 @@ class GroupArrays(NamedTuple):
     """State of G groups and of the ways they walk. The goal kernels update all from current on but speed and finish."""
 
     route: Array  # (G, W, 2) x, y of each group's waypoints, m
-    kind: Ints  # (G, W) PASS, NARROW (door), GATHER or END of each waypoint
+    kind: Ints  # (G, W) PASS, GATHER or END of each waypoint
     length: Ints  # (G,) number of waypoints; later entries of route and kind mean nothing
     current: Ints  # (G,) index, from 0, of the waypoint the group is walking to
     speed: Array  # (G,) m/s
     heading: Array  # (G, 2) unit vector in which the group faces
     finish: Ints  # (G,) STAND or LEAVE at the end of the way
+    filing: Bools  # (G,) True while the members walk each alone, as through a gate
+    held_up: Array  # (G,) s for which others have held the group up just before its end
     # (G,) True once the end of the way is reached. status (G, 12), rewritten in each step: number of members present;
     # mean position x, y, m; mean velocity x, y, m/s; largest distance of a member from the mean position, and from its
     # place, m; wanted velocity x, y, m/s; 1.0 while other groups avoid this group as a whole, else 0.0; mean of the
@@ -106,8 +108,8 @@ class GroupArrays(NamedTuple):
         """Returns arrays for g groups with room for w waypoints each: headings (1, 0), all other values 0."""
         return cls(
             np.zeros((g, w, 2)), np.zeros((g, w), np.int64), np.zeros(g, np.int64), np.zeros(g, np.int64), np.zeros(g),
-            np.tile([1.0, 0.0], (g, 1)), np.zeros(g, np.int64), np.zeros(g, np.bool_), np.zeros((g, 12)),
-            np.zeros((g, 2)), np.arange(g),
+            np.tile([1.0, 0.0], (g, 1)), np.zeros(g, np.int64), np.zeros(g, np.bool_), np.zeros(g),
+            np.zeros(g, np.bool_), np.zeros((g, 12)), np.zeros((g, 2)), np.arange(g),
         )  # fmt: skip
 
     def with_room(self, w: int) -> GroupArrays:
@@ -122,8 +124,8 @@ class PeopleArrays(NamedTuple):
     """What the kernels know of the N people present, in the order of the physics engine's rows."""
 
     place: Array  # (N, 2) place in the formation, m: forward and left of the group's middle
-    target: Array  # (N, 2) x, y of the place in a queue, m; used only for people in mode TO_TARGET
-    pace: Array  # (N,) greatest speed on the way to the target, m/s
+    target: Array  # (N, 2) x, y, m, of the place in a queue, or of the point to which a person walks alone
+    pace: Array  # (N,) greatest speed on the way there, m/s
     # (N, 4) fluctuation of the wanted velocity in its direction and to its left, m/s, and of the place in the
     # formation, forward and left, m
     noise: Array
@@ -132,15 +134,14 @@ class PeopleArrays(NamedTuple):
     gait: Array
     calm: Array  # (N, 4) x, y, vx, vy without the velocity of the sway, m, m/s
     wanted: Array  # (N, 2) wanted velocity without its fluctuation, m/s. The goal kernels overwrite both.
-    # (N, 4) columns GROUP (index), MODE (IN_GROUP or TO_TARGET), QUEUE (index, -1 in no queue), WAYPOINT (index of the
-    # first waypoint that this person has not passed)
+    # (N, 3) columns GROUP (index), MODE (IN_GROUP, TO_TARGET or ALONE), QUEUE (index, -1 in no queue)
     tag: Ints
 
     @classmethod
     def empty(cls, n: int) -> PeopleArrays:
         """Returns arrays for n people: paces 1, tags -1, all other values 0."""
         two, four = ([np.zeros((n, k)) for _ in range(3)] for k in (2, 4))
-        tag = np.full((n, 4), -1, np.int64)
+        tag = np.full((n, 3), -1, np.int64)
         return cls(two[0], two[1], np.ones(n), four[0], np.zeros((n, 5)), four[1], two[2], tag)
 
 

@@ -13,11 +13,10 @@ from sim.compiler import njit
 # isort: off
 # fmt: off
 from sim.crowd.forces import (
-    ALIGNMENT, AMPLITUDE, AVOIDED, COHESION_TIME, COS, COUNT, END, GATHER,
+    ALIGNMENT, ALONE, AMPLITUDE, AVOIDED, COHESION_TIME, COS, COUNT, END, GATHER,
     GATHER_RADIUS, GROUP, HASTE, MAX_OFF_PLACE, MEAN_AHEAD, MEAN_LEFT, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y,
-    MODE, NARROW, PASS, PASS_RADIUS, RADIUS, RELAXATION, SIN, SLOW_TIME, SLOWDOWN, STAND, STRAY_AHEAD, STRAY_LEFT,
-    SWAY_X, SWAY_Y, TO_TARGET, TURN_TIME, VX, VY, WANDER_ALONG, WANDER_LEFT, WANTED_VX, WANTED_VY, WAYPOINT,
-    X, Y,
+    MODE, PASS, PASS_RADIUS, RADIUS, RELAXATION, SIN, SLOW_TIME, SLOWDOWN, STAND, STRAY_AHEAD, STRAY_LEFT,
+    SWAY_X, SWAY_Y, TO_TARGET, TURN_TIME, VX, VY, WANDER_ALONG, WANDER_LEFT, WANTED_VX, WANTED_VY, X, Y,
 )
 # fmt: on
 # isort: on
@@ -61,8 +60,9 @@ GATHER_TIME = 0.8  # s: time in which a member reaches its place at the gatherin
 STANDING_SPEED = 0.3  # m/s: fastest shift of a group that has arrived; fluctuations grow up to this speed
 TURN_DISTANCE = 0.3  # m: nearer to the waypoint the heading is kept
 ARRIVED = 0.25  # m from the end
-DOOR_DISTANCE = 0.45  # m from the middle of a door: the person is through
-DOOR_PACE = 0.6  # share of the speed of those who are through and wait for the others
+HELD_UP_TIME, HELD_UP_SPEED = 2.0, 0.2  # s, m/s: a group so slow for so long near its end is held up by others
+NEAR_GOAL = 2.0  # m: others hold a group up there, and it slows down to turn
+TURNING = 0.4  # share of the speed of a group that has the near next point of its way beside or behind it
 LOOSE = 2.2  # m: a group with a larger radius is not avoided as a whole
 
 
@@ -109,22 +109,7 @@ def _spread(state, place, tag, route, kind, current, heading, status):  # type: 
 
 
 @njit(cache=True)
-def _pass_doors(tag, kind, length, current, status):  # type: ignore[no-untyped-def]
-    """Advances `current` of each group at a door by one, once every member present has passed the door."""
-    for g in range(len(status)):
-        status[g, AVOIDED] = 1.0
-    for i in range(len(tag)):
-        g = tag[i, GROUP]
-        if kind[g, current[g]] == NARROW and tag[i, WAYPOINT] <= current[g]:
-            status[g, AVOIDED] = 0.0
-    for g in range(len(status)):
-        at_door = length[g] > 0 and kind[g, current[g]] == NARROW
-        if status[g, COUNT] > 0.0 and at_door and status[g, AVOIDED] > 0.0:
-            current[g] += 1
-
-
-@njit(cache=True)
-def _lead_groups(route, kind, length, current, speed, heading, finish, arrived, status, dt):  # type: ignore[no-untyped-def]
+def _lead_groups(route, kind, length, current, speed, heading, finish, filing, held_up, arrived, status, dt):  # type: ignore[no-untyped-def]
     """Advances each group on its way by dt (s), and sets its wanted velocity."""
     for g in range(len(status)):
         if status[g, COUNT] == 0.0 or length[g] == 0:
@@ -133,7 +118,7 @@ def _lead_groups(route, kind, length, current, speed, heading, finish, arrived, 
         goal = kind[g, w]
         dx, dy = route[g, w, 0] - status[g, MEAN_X], route[g, w, 1] - status[g, MEAN_Y]
         d = sqrt(dx * dx + dy * dy)
-        if (goal == PASS and d < PASS_RADIUS + 0.3 * status[g, RADIUS]) or (
+        if (goal == PASS and d < PASS_RADIUS + 0.3 * status[g, RADIUS] and not filing[g]) or (
             goal == GATHER and status[g, MAX_OFF_PLACE] < GATHER_RADIUS
         ):
             if w < last:
@@ -153,7 +138,13 @@ def _lead_groups(route, kind, length, current, speed, heading, finish, arrived, 
                     arrived[g] = True
             elif d < PASS_RADIUS:
                 arrived[g] = True
+            moves = _length(status[g, MEAN_VX], status[g, MEAN_VY]) > HELD_UP_SPEED or arrived[g]
+            held_up[g] = 0.0 if moves or d > NEAR_GOAL else held_up[g] + dt
+            if held_up[g] > HELD_UP_TIME:
+                arrived[g] = True
         if d > TURN_DISTANCE and goal != GATHER and not arrived[g]:
+            if d < NEAR_GOAL and heading[g, 0] * dx + heading[g, 1] * dy < 0.5 * d:
+                pace *= TURNING  # else it walks round the point for ever
             _turn(heading, g, dx / d, dy / d, dt / TURN_TIME)
         if arrived[g] and finish[g] == STAND:
             # It drifts back to the end of its way.
@@ -192,9 +183,11 @@ def _seek(  # type: ignore[no-untyped-def]
         if tag[i, MODE] == TO_TARGET:
             limit = pace[i]
             tx, ty = (target[i, 0] - x) / TARGET_TIME, (target[i, 1] - y) / TARGET_TIME
-        elif goal == NARROW and length[g] > 0:
-            limit = speed[g]
-            tx, ty = _through_door(route, current, tag, i, g, x, y, limit)
+        elif tag[i, MODE] == ALONE:
+            limit = pace[i]
+            dx, dy = target[i, 0] - x, target[i, 1] - y
+            d = max(_length(dx, dy), TINY)
+            tx, ty = dx / d * limit, dy / d * limit
         else:
             hx, hy = heading[g, 0], heading[g, 1]
             ahead, left = place[i, 0], place[i, 1]
@@ -231,20 +224,6 @@ def _seek(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _through_door(route, current, tag, i, g, x, y, limit):  # type: ignore[no-untyped-def]
-    """Returns the wanted velocity of person i at (x, y), whose group g is at a door."""
-    door = current[g]
-    w = max(tag[i, WAYPOINT], door)
-    dx, dy = route[g, w, 0] - x, route[g, w, 1] - y
-    d = max(sqrt(dx * dx + dy * dy), TINY)
-    if w == door and d < DOOR_DISTANCE:
-        tag[i, WAYPOINT] = door + 1
-    if w > door:
-        limit *= DOOR_PACE
-    return dx / d * limit, dy / d * limit
-
-
-@njit(cache=True)
 def _pace_on_stairs(x, y, stairs):  # type: ignore[no-untyped-def]
     """Returns the share of the walking speed that is kept at (x, y); 1.0 off all stairs."""
     for k in range(len(stairs)):
@@ -257,17 +236,17 @@ def _pace_on_stairs(x, y, stairs):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _mark_avoided(kind, current, status):  # type: ignore[no-untyped-def]
+def _mark_avoided(filing, status):  # type: ignore[no-untyped-def]
     """Sets AVOIDED of `status` to 1.0 if others avoid the group as a whole, else 0.0."""
     for g in range(len(status)):
         together = status[g, COUNT] > 0.0 and status[g, RADIUS] <= LOOSE
-        status[g, AVOIDED] = 1.0 if together and kind[g, current[g]] != NARROW else 0.0
+        status[g, AVOIDED] = 1.0 if together and not filing[g] else 0.0
 
 
 @njit(cache=True)
 def accelerate(  # type: ignore[no-untyped-def]
     state, place, target, pace, noise, gait, calm, wanted, tag,
-    route, kind, length, current, speed, heading, finish, arrived, status, push, by_x,
+    route, kind, length, current, speed, heading, finish, filing, held_up, arrived, status, push, by_x,
     stairs, walls, pillars, dt, out,
 ):  # fmt: skip
     """Overwrites out (N, 2) with the accelerations of all people, m/s², and advances ways and strides by dt (s).
@@ -283,13 +262,12 @@ def accelerate(  # type: ignore[no-untyped-def]
         calm[i, VX], calm[i, VY] = state[i, VX] - gait[i, SWAY_X], state[i, VY] - gait[i, SWAY_Y]
     _average(calm, noise, tag, status)
     _spread(calm, place, tag, route, kind, current, heading, status)
-    _pass_doors(tag, kind, length, current, status)
-    _lead_groups(route, kind, length, current, speed, heading, finish, arrived, status, dt)
+    _lead_groups(route, kind, length, current, speed, heading, finish, filing, held_up, arrived, status, dt)
     _seek(
         calm, place, target, pace, noise, wanted, tag,
         route, kind, length, current, speed, heading, status, stairs, out,
     )  # fmt: skip
-    _mark_avoided(kind, current, status)
+    _mark_avoided(filing, status)
     _sway(wanted, gait, dt, out)
     avoid(calm, tag, status, push, by_x, walls, pillars, out)
     return True

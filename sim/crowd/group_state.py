@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.crowd.forces import END, GATHER, IN_GROUP, LEAVE, NARROW, PASS, STAND, TO_TARGET, GroupArrays, PeopleArrays
+from sim.crowd.forces import ALONE, END, GATHER, IN_GROUP, LEAVE, PASS, STAND, TO_TARGET, GroupArrays, PeopleArrays
 from sim.crowd.formation import assign, standing, to_world, walking
 from sim.crowd.navigation import Navigator
 from sim.crowd.population import EnteringGroup, walking_speed
@@ -26,11 +26,14 @@ class GroupState:
 
     State: alive: index of each existing group by name; arrays: the ways of groups, as the kernels use them; next_group:
     index of the next new group; settled: indices of groups that stand in a circle. By group index, also for groups that
-    ended: members (columns), spacing (m), goals (point and "stand", "leave" or "walk"). everybody: all people, by
-    column, as the kernels use those who are present; its columns are also places (in the formation, m), targets (place
-    in the queue, or where a held person stands, m), group_of (group index), mode, queue_of (index of the queue order,
-    -1 in no queue) and waypoint (the first one not passed). Also by column: held: True for a person who stays behind
-    at a stop; present; free_speed (m/s).
+    ended: members (columns), spacing (m), goals (point and "stand", "leave" or "walk"); gate (G, W): the gate that each
+    waypoint lies in, -1 for none. everybody: all people, by column, as the kernels use those who are present; its
+    columns are also places (in the formation, m), group_of (group index), mode and queue_of (index of the queue order,
+    -1 in no queue). Also by column: targets (place in the queue, or where a held person stands, m); held: True for a
+    person who stays behind at a stop; alone: True for a person who walks alone, at `share` of the speed, to the point
+    `aims`, m; waypoint (the first one not passed); apart: of people who have lost the group, the first column of those
+    with whom they walk, else -1; gone: True for a person who has come to the end of the way alone, and leaves; present;
+    free_speed (m/s).
     """
 
     def __init__(self, entering: list[EnteringGroup], new: int, navigator: Navigator, slowdown: float) -> None:
@@ -45,9 +48,16 @@ class GroupState:
         self.goals: dict[int, tuple[Array, str]] = {g.index: (g.goal, g.finish) for g in entering}
         self.free_speed = np.array([m.free_speed for m in people])
         self.everybody = PeopleArrays.empty(len(people))
-        self.places, self.targets = self.everybody.place, self.everybody.target
-        self.group_of, self.mode, self.queue_of, self.waypoint = self.everybody.tag.T
-        self.waypoint[:] = 0
+        self.places = self.everybody.place
+        self.group_of, self.mode, self.queue_of = self.everybody.tag.T
+        self.targets, self.aims, self.share = (
+            np.zeros((len(people), 2)),
+            np.zeros((len(people), 2)),
+            np.ones(len(people)),
+        )
+        self.alone, self.gone = np.zeros(len(people), np.bool_), np.zeros(len(people), np.bool_)
+        self.waypoint, self.apart = np.zeros(len(people), np.int64), np.full(len(people), -1)
+        self.gate = np.full(self.arrays.kind.shape, -1)
         for index, columns in self.members.items():
             self.group_of[columns] = index
         self.held = np.zeros(len(people), np.bool_)
@@ -76,11 +86,15 @@ class GroupState:
         columns (N,): the people to examine; those in a queue stay. Returns the columns of the people who left.
         """
         done = self.arrays.arrived & (self.arrays.finish == LEAVE)
-        if not done.any():
+        if not done.any() and not self.gone.any():
             return []
-        out = done[self.group_of[columns]] & (self.queue_of[columns] < 0)
+        out = done[self.group_of[columns]] & (self.queue_of[columns] < 0) | self.gone[columns]
         gone = [int(c) for c in columns[out]]
         self.present[gone] = False
+        for g in {int(self.group_of[c]) for c in gone if self.gone[c]}:  # the others are a smaller group
+            stay = [c for c in self.members[g] if self.present[c]]
+            if stay:
+                self.places[stay] -= self.places[stay].mean(axis=0)
         return gone
 
     def go(
@@ -94,23 +108,27 @@ class GroupState:
         point.
         """
         way: list[tuple[Array, int]] = [] if gather is None else [(gather, GATHER)]
+        gates = [-1] * len(way)
         here = start if gather is None else gather
         for target in [*via, goal]:
             found = self.navigator.way(here, target)
             # Where no way exists, the group walks straight.
-            points, narrow = found if found is not None else (target[None], np.zeros(1, dtype=bool))
-            way += [(p, NARROW if n else PASS) for p, n in zip(points, narrow, strict=True)]
+            points, gate = found if found is not None else (target[None], np.full(1, -1))
+            way += [(p, PASS) for p in points]
+            gates += gate.tolist()
             here = target
         if finish == "walk":
             along = goal - (way[-2][0] if len(way) > 1 else start)
             way[-1] = (goal + WALK_ON * along / max(float(length(along)), 1e-9), END)
         way[-1] = (way[-1][0], END)
         self.write_way(g, way, finish, speed, start)
+        self.gate[g, : len(gates)] = gates
 
     def ahead(self, g: int) -> list[Array]:
         """Returns the points (2,) m that a group has yet to pass, without doors and the end of its way."""
         current, count = int(self.arrays.current[g]), int(self.arrays.length[g])
-        return [self.arrays.route[g, k] for k in range(current, count) if self.arrays.kind[g, k] == PASS]
+        points = [k for k in range(current, count) if self.arrays.kind[g, k] == PASS and self.gate[g, k] < 0]
+        return [self.arrays.route[g, k] for k in points]
 
     def gathers(self, g: int) -> bool:
         """Returns True if the group waits for others at the first point of its way."""
@@ -119,15 +137,18 @@ class GroupState:
     def write_way(self, g: int, way: list[tuple[Array, int]], finish: str, speed: float, start: Array) -> None:
         """Overwrites the waypoints, speed (m/s) and finish of group g; the group starts anew at the first waypoint.
 
-        way: pairs of a point (2,) m and a kind of waypoint (PASS, NARROW, GATHER, END). finish: as in `go`. start (2,):
+        way: pairs of a point (2,) m and a kind of waypoint (PASS, GATHER, END). finish: as in `go`. start (2,):
         the group's position in m, from which the group turns to its first waypoint.
         """
         self.arrays = arrays = self.arrays.with_room(len(way))
+        room = (0, arrays.kind[0].size - self.gate[0].size)
+        self.gate = np.pad(self.gate, ((0, 0), room), constant_values=-1)
+        self.gate[g] = -1
         for k, (point, kind) in enumerate(way):
             arrays.route[g, k], arrays.kind[g, k] = point, kind
         arrays.length[g], arrays.current[g], arrays.speed[g] = len(way), 0, speed
         arrays.finish[g] = LEAVE if finish == "leave" else STAND
-        arrays.arrived[g] = False
+        arrays.arrived[g], arrays.filing[g], arrays.held_up[g] = False, False, 0.0
         first = way[0][0] if way[0][1] != GATHER or len(way) == 1 else way[1][0]
         ahead = first - (way[0][0] if way[0][1] == GATHER else start)
         size = float(length(ahead))
@@ -172,8 +193,15 @@ class GroupState:
                 changed = True
         return changed
 
+    def intent(self, columns: Ints) -> Ints:
+        """Returns the group that each person in columns (N,) means to be in; of the lost a number beyond all groups."""
+        apart = self.apart[columns]
+        return np.where(apart >= 0, len(self.arrays.length) + apart, self.group_of[columns])
+
     def rows(self, columns: Ints) -> PeopleArrays:
         """Returns copies of the arrays of the people in columns (N,), for the kernels."""
-        self.everybody.pace[:] = np.minimum(self.arrays.speed[self.group_of], MAX_QUEUE_SPEED)
-        self.mode[:] = np.where((self.queue_of >= 0) | self.held, TO_TARGET, IN_GROUP)
+        speed = self.arrays.speed[self.group_of]
+        self.everybody.pace[:] = np.where(self.alone, speed * self.share, np.minimum(speed, MAX_QUEUE_SPEED))
+        self.everybody.target[:] = np.where(self.alone[:, None], self.aims, self.targets)
+        self.mode[:] = np.where(self.alone, ALONE, np.where((self.queue_of >= 0) | self.held, TO_TARGET, IN_GROUP))
         return PeopleArrays._make(values[columns] for values in self.everybody)

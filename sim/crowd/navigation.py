@@ -10,9 +10,9 @@ import numpy as np
 from scenarios.schema.geometry import cut_walls
 from scenarios.schema.scenario import WorldSpec
 from sim.elementary import dot, length
-from sim.types import Array, Bools, Scene
+from sim.geometry.walls import blocked, wall_distances
+from sim.types import Array, Ints, Scene
 
-BEHIND = 0.7  # m behind a door, where nobody touches the wall any more
 CLEARANCE = 0.6  # m kept from a wall's end on the way round it
 
 
@@ -21,103 +21,87 @@ def scene_of(world: WorldSpec) -> Scene:
     return Scene.of(world, *cut_walls(world))
 
 
-def wall_distances(point: Array, wall: Array) -> Array:
-    """Returns the distances (...) m of points (..., 2) m from walls with the two ends `wall` (..., 2, 2) m."""
-    along, off = wall[..., 1, :] - wall[..., 0, :], point - wall[..., 0, :]
-    s = np.clip(dot(off, along) / np.maximum(dot(along, along), 1e-12), 0, 1)
-    return length(off - s[..., None] * along)
-
-
-def blocked(a: Array, b: Array, walls: Array) -> Bools:
-    """Returns flags (...): True where the segment from a to b, (..., 2) m, crosses one of the walls (W, 2, 2) m.
-
-    A segment that only touches a wall, or whose end lies on the wall, does not cross it.
-    """
-    if not len(walls):
-        return np.zeros(a.shape[:-1], dtype=np.bool_)
-    p, q = walls[:, 0], walls[:, 1]
-
-    def side(o: Array, u: Array, v: Array) -> Array:
-        return np.asarray(
-            (u[..., 0] - o[..., 0]) * (v[..., 1] - o[..., 1]) - (u[..., 1] - o[..., 1]) * (v[..., 0] - o[..., 0])
-        )
-
-    a, b = a[..., None, :], b[..., None, :]
-    crosses = (side(a, b, p) * side(a, b, q) < 0) & (side(p, q, a) * side(p, q, b) < 0)
-    return np.asarray(crosses.any(axis=-1))
+NARROW_GAP, LEAST_GAP = 1.3, 0.42  # m: a gap between walls of such a width is a gate, as a door is
 
 
 class Navigator:
-    """Finds the shortest ways round walls and through doors in one scene.
+    """Finds the shortest ways round walls and through gates in one scene.
 
-    nodes (N, 2): middles of doors, then points beyond the ends of walls, m. edges (N, N): distance between two nodes in
-    m, inf if a wall or door lies between them. Doors block segments like walls, so every way through a door leads over
-    its middle.
+    gates (K, 2, 2): the ends of doors and of narrow gaps between walls, m. closed (W + K, 4): walls, then gates, as x1,
+    y1, x2, y2: gates block segments like walls, so every way through a gate leads over its middle. nodes (N, 2):
+    middles of gates, then points round the ends of walls, m. far (N, N): length of the shortest way between two nodes
+    in m, inf for none.
     """
 
     def __init__(self, scene: Scene) -> None:
-        self.size, self.walls = scene.size, np.asarray(scene.walls)
-        self.doors = np.asarray(scene.doors).reshape(-1, 2, 2)
-        self.closed = np.concatenate([self.walls.reshape(-1, 2, 2), self.doors])
+        self.size, self.walls = scene.size, np.asarray(scene.walls, float).reshape(-1, 2, 2)
+        self.first = len(self.walls)
+        doors = np.asarray(scene.doors, float).reshape(-1, 2, 2)
+        self.gates = np.concatenate([doors, self._gaps(doors)])
+        self.closed = np.concatenate([self.walls, self.gates]).reshape(-1, 4)
         ends = self._wall_ends() if len(self.walls) else np.zeros((0, 2))
-        self.nodes = np.concatenate([self.doors.mean(axis=1), ends])
-        self.edges = self._lengths(self.nodes, self.nodes)
+        self.nodes = np.concatenate([self.gates.mean(axis=1), ends])
+        self.far, self._before = np.zeros((0, 0)), np.zeros((0, 0), np.int64)
+        if len(self.nodes):
+            from scipy.sparse.csgraph import dijkstra
+
+            from sim.crowd.wayfinding_kernels import between
+
+            self.far, self._before = dijkstra(between(self.nodes, self.closed, self.first), return_predecessors=True)
+
+    def _gaps(self, doors: Array) -> Array:
+        """Returns the narrow gaps (K, 2, 2) between the end of a wall and another wall that no door fills."""
+        found: list[Array] = []
+        for k, wall in enumerate(self.walls):
+            for end in wall:
+                for other in np.delete(self.walls, k, axis=0):
+                    along, off = other[1] - other[0], end - other[0]
+                    foot = other[0] + np.clip(dot(off, along) / max(float(dot(along, along)), 1e-12), 0, 1) * along
+                    gap, middle = np.stack([end, foot]), (end + foot) / 2
+                    if not LEAST_GAP < float(length(end - foot)) < NARROW_GAP:
+                        continue
+                    near = [*doors.mean(axis=1), *(g.mean(axis=0) for g in found)]
+                    if any(float(length(middle - m)) < NARROW_GAP / 2 for m in near):
+                        continue
+                    a, b = (gap + 1e-6 * (gap[::-1] - gap))[:, None]
+                    if blocked(a, b, self.walls).any():
+                        continue
+                    across = np.array([foot[1] - end[1], end[0] - foot[0]]) / length(foot - end)
+                    sides = middle + CLEARANCE * np.stack([across, 0 * across, -across])
+                    if (wall_distances(sides[:, None], self.walls) > LEAST_GAP / 2.1).all():  # no corner, nor a wall
+                        found.append(gap)
+        return np.array(found).reshape(-1, 2, 2)
 
     def _wall_ends(self) -> Array:
         along = self.walls[:, 1] - self.walls[:, 0]
         along = along / length(along)[:, None]
         ends = np.concatenate([self.walls[:, 0] - CLEARANCE * along, self.walls[:, 1] + CLEARANCE * along])
-        free = (wall_distances(ends[:, None], self.closed) > 0.9 * CLEARANCE).all(axis=1)
+        closed = self.closed.reshape(-1, 2, 2)
+        free = (wall_distances(ends[:, None], closed) > 0.9 * CLEARANCE).all(axis=1)
         inside = ((ends >= 0) & (ends <= self.size)).all(axis=1)
         return np.asarray(ends[inside & free])
 
-    def _lengths(self, a: Array, b: Array) -> Array:
-        d = length(a[:, None] - b[None])
-        hidden = blocked(np.repeat(a[:, None], len(b), 1), np.repeat(b[None], len(a), 0), self.closed)
-        return np.asarray(np.where(hidden, np.inf, d))
-
-    def way(self, start: Array, goal: Array) -> tuple[Array, Bools] | None:
-        """Returns the points (K, 2) m to walk to, the goal last, and flags (K,): True for points at a door.
+    def way(self, start: Array, goal: Array) -> tuple[Array, Ints] | None:
+        """Returns the points (K, 2) m to walk to, the goal last, and for each the gate that it lies in, -1 for none.
 
         start, goal (2,): m. None if there is no way.
         """
         ends = np.stack([start, goal])
-        if not blocked(ends[:1], ends[1:], self.closed)[0]:
-            return ends[1:], np.zeros(1, dtype=np.bool_)
-        points = np.concatenate([self.nodes, ends])
-        n = len(points)
-        lengths = np.full((n, n), np.inf)
-        lengths[: n - 2, : n - 2] = self.edges
-        lengths[: n - 2, n - 2 :] = self._lengths(self.nodes, ends)
-        lengths[n - 2 :, : n - 2] = lengths[: n - 2, n - 2 :].T
-        path = _shortest(lengths, n - 2, n - 1)
-        if path is None:
+        if not blocked(ends[:1], ends[1:], self.closed.reshape(-1, 2, 2))[0]:
+            return ends[1:], np.full(1, -1)
+        if not len(self.nodes):
             return None
-        way, narrow, here = [], [], start
-        for k in path:
-            way.append(points[k])
-            narrow.append(k < len(self.doors))
-            # A second point beyond the door, where nobody touches the wall any more.
-            if narrow[-1]:
-                way.append(points[k] + self._beyond_door(k, points[k] - here))
-                narrow.append(True)
-            here = points[k]
-        return np.array(way), np.array(narrow)
+        from sim.crowd.wayfinding_kernels import in_sight
 
-    def _beyond_door(self, door: int, way: Array) -> Array:
-        along = self.doors[door, 1] - self.doors[door, 0]
-        across = np.array([-along[1], along[0]]) / length(along)
-        return np.asarray(BEHIND * across * (1.0 if dot(across, way) > 0 else -1.0))
-
-
-def _shortest(lengths: Array, start: int, goal: int) -> list[int] | None:
-    """Returns the shortest path as node indices without the start; None if there is none."""
-    from scipy.sparse.csgraph import dijkstra
-
-    far, before = dijkstra(lengths, indices=start, return_predecessors=True)
-    if not np.isfinite(far[goal]):
-        return None
-    path = [goal]
-    while before[path[-1]] != start:
-        path.append(int(before[path[-1]]))
-    return path[::-1]
+        here, there = in_sight(ends, self.nodes, self.closed, self.first)
+        lengths = here[:, None] + self.far + there
+        n, m = np.unravel_index(np.argmin(lengths), lengths.shape)
+        if not np.isfinite(lengths[n, m]):
+            return None
+        path = [int(m)]
+        while path[-1] != n:
+            path.append(int(self._before[n, path[-1]]))
+        nodes = np.array(path[::-1])
+        return np.concatenate([self.nodes[nodes], ends[1:]]), np.append(
+            np.where(nodes < len(self.gates), nodes, -1), -1
+        )

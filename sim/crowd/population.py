@@ -18,8 +18,8 @@ from scenarios.errors import InputError, counted
 from scenarios.schema.scenario import CrowdSpec, GroupSpec, Scenario, Stop, group_names
 from scenarios.schema.values import Distribution, Point, Value
 from sim.crowd.formation import to_world, walking
-from sim.crowd.navigation import wall_distances
 from sim.elementary import exp, length, unit
+from sim.geometry.walls import wall_distances
 from sim.rng import autoregression, draw, normals, rng, uniforms
 from sim.types import Array, Order, Scene
 

@@ -72,6 +72,10 @@ class Stops:
                 changed |= self._advance(g, visit, columns, t, state)
         return changed
 
+    def standing(self) -> list[int]:
+        """Returns the groups that stand at a stop."""
+        return [g for g, visit in self.visits.items() if visit.leaves is not None]
+
     def stood(self, g: int, columns: list[int], since: float) -> bool:
         """Returns True if a group has stood at a stop since this time (s), or some of its members have."""
         now = bool(self.groups.held[columns].any()) or (g in self.visits and self.visits[g].leaves is not None)

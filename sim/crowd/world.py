@@ -22,18 +22,20 @@ import pymunk.batch
 from scenarios.errors import WorkError
 from scenarios.schema.scenario import Scenario
 from sim.clock import PHYSICS_RATE, SCRIPT_RATE, STEPS, FrameTimes
-from sim.crowd.arrival import NEAR_GOAL, STAND_TIME, has_way, obstacle, stands
-from sim.crowd.forces import AMPLITUDE, COS, SIN, WAYPOINT, Obstacles, PeopleArrays
+from sim.crowd.arrival import NEAR_GOAL, STAND_TIME, has_way, immobile_people, obstacle, stands
+from sim.crowd.forces import AMPLITUDE, COS, GATHER, SIN, Obstacles, PeopleArrays
 from sim.crowd.group_state import GroupState
 from sim.crowd.heading import facings, headings
-from sim.crowd.navigation import Navigator, blocked, scene_of
+from sim.crowd.navigation import Navigator, scene_of
 from sim.crowd.order_execution import OrderExecution, groups_made
 from sim.crowd.population import BODY_RADIUS, EnteringGroup, draw_population, fluctuations, script_placement
 from sim.crowd.stops import Stops
+from sim.crowd.wayfinding import Wayfinding
 from sim.elementary import cos, length, sin
+from sim.geometry.walls import blocked
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.scene.terrain import flight_rows
-from sim.types import Array, Ints, Motion, NeverArrives, Scene, States
+from sim.types import Array, Bools, Ints, Motion, NeverArrives, Scene, States
 
 STEP_TIME = 1 / PHYSICS_RATE  # s
 OVERLAP_LEFT = 0.0012600931512018426  # 0.875^50: share of an overlap of bodies that is left after 1 s, 0.875 a step.
@@ -68,6 +70,7 @@ class World:
         self.groups = GroupState(self.entering, groups_made(scenario), Navigator(self.scene), slowdown)
         self.orders = OrderExecution(scenario, self.groups, script_placement(scenario, seed, repeat), seed, repeat)
         self.stops = Stops(self.entering, self.groups, self.scene)
+        self.wayfinding = Wayfinding(self.groups)
         stairs = np.column_stack([flight_rows(self.scene), [spec.slowdown for spec in scenario.world.stairs]])
         self.obstacles = Obstacles.of(stairs, np.array(self.scene.walls).reshape(-1, 4), np.array(self.scene.pillars))
         self.space = _space(self.scene)
@@ -95,14 +98,25 @@ class World:
         frames = FrameTimes.of(max(1, round(duration * fps)), fps)
         people, needed = len(self.members), count if self.between is None else max(count, int(frames.tick[-1]) + 2)
         states, intents = np.empty((needed, people, 4)), np.empty((needed, people), np.int64)
+        free = np.empty((needed, people), np.bool_)
         shown = states[: len(frames.tick)] if self.between is None else np.empty((len(frames.tick), people, 4))
         for tick, (state, group) in enumerate(self.ticks(needed)):
             states[tick], intents[tick] = state, group
+            free[tick] = free[tick - 1] if tick % SCRIPT_RATE else self._free_to_walk()  # looked at once a second
             if tick and self.between is not None:  # what lies between two ticks is known at the second one
                 shown[frames.within(tick - 1)] = frames.states(tick - 1, self.between)
         lost = tuple(self._never_arrive(states[:count]))
         motion = self._motion(states[:count], intents[:count], shown, intents[frames.tick], frames)
-        return motion.replace(never_arrive=lost) if lost else motion
+        return motion.replace(
+            never_arrive=lost, immobile=immobile_people(states[:count, :, :2], free[:count], SCRIPT_RATE)
+        )
+
+    def _free_to_walk(self) -> Bools:
+        """Returns flags (P,): False for people whom a queue, a stop, a gathering or the end of their way bids wait."""
+        groups, arrays = self.groups, self.groups.arrays
+        waits = arrays.arrived | (arrays.kind[np.arange(len(arrays.kind)), arrays.current] == GATHER)
+        waits[self.stops.standing()] = True
+        return np.asarray(~(waits[groups.group_of] | (groups.queue_of >= 0) | groups.held))
 
     def _never_arrive(self, states: Array) -> Iterator[NeverArrives]:
         """Yields the groups that do not reach their goal. states (C, P, 4): at the ticks, by column."""
@@ -140,8 +154,9 @@ class World:
             self.states[self.columns] = self.state
             changed = self.stops.advance(t, self.states)
             if tick >= 0:
-                self.group_of[self.columns] = self.groups.group_of[self.columns]
+                self.group_of[self.columns] = self.groups.intent(self.columns)
                 changed |= self.orders.advance(tick, t, self.states)
+            changed |= self.wayfinding.advance(t, self.states)
             if changed:
                 self.people = self.groups.rows(self.columns)
             if tick >= 0:
@@ -169,7 +184,6 @@ class World:
             self._read(READ)
             if self.between is not None:
                 self.between[step, self.columns] = self.state
-        self.groups.waypoint[self.columns] = self.people.tag[:, WAYPOINT]
         self.groups.everybody.gait[self.columns] = self.people.gait
 
     def _come_and_go(self, t: float, first: bool) -> None:

@@ -26,7 +26,7 @@ from sim.dataset.replay import WHOLE, Cut, replay_name, resolve_replay
 from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
 from sim.store import sequence_folder
 from sim.store.atomic import PARTIAL, lock_folder, remove_partials, write_file
-from sim.store.group_files import read_never_arrives
+from sim.store.group_files import read_immobile, read_never_arrives
 from sim.store.own_files import is_side_file, output_path, output_paths
 from sim.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest, reject_runs
 from sim.streams import check_streams
@@ -232,16 +232,17 @@ def generate(
         many = len(unfulfilled) > LEFT_OUT * len(jobs)
         raise _summary({name: e for name, e in errors.items() if many or name not in unfulfilled}, len(jobs))
     made = Folders((job.folder for job in jobs if job.name not in unfulfilled), unfulfilled)
-    _warn_of_lost_groups(made)
+    _warn_of_who_stands(made)
     return made
 
 
-def _warn_of_lost_groups(folders: Iterable[Path]) -> None:
-    lost = [(folder.name, one) for folder in folders for one in read_never_arrives(folder)]
-    if lost:
-        (name, first), sequences = lost[0], len({name for name, _ in lost})
-        more = f"; {counted(len(lost), 'group')} in {counted(sequences, 'sequence')}" if len(lost) > 1 else ""
-        warnings.warn(f"{name}: {first.words}{more}", stacklevel=3)
+def _warn_of_who_stands(folders: Iterable[Path]) -> None:
+    for read, what in ((read_never_arrives, ("group",)), (read_immobile, ("person", "people"))):
+        found = [(folder.name, one) for folder in folders for one in read(folder)]
+        if found:
+            (name, first), sequences = found[0], len({name for name, _ in found})
+            more = f"; {counted(len(found), *what)} in {counted(sequences, 'sequence')}" if len(found) > 1 else ""
+            warnings.warn(f"{name}: {first.words}{more}", stacklevel=3)
 
 
 @contextmanager

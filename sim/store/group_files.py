@@ -27,10 +27,10 @@ from sim.arrays import joined, no_ids
 from sim.store import tables
 from sim.store.numeric_text import is_number_text, read_number, read_rows, read_text, whole_or_number
 from sim.store.tables import AXES, EXTENT, Count, FrameNumber, Id, Number, Pair, StoredTable, along, validated
-from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, NeverArrives, Order
+from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Immobile, Ints, Near, NeverArrives, Order
 
 NEAR_COLUMNS = "start,end,a,b"
-NEVER_ARRIVES = "gt/never_arrives.json"
+NEVER_ARRIVES, IMMOBILE = "gt/never_arrives.json", "gt/immobile.json"
 GroupId = Annotated[int, Field(strict=True, ge=-1, le=INTEGER)]
 
 
@@ -94,6 +94,12 @@ def read_never_arrives(folder: Path) -> tuple[NeverArrives, ...]:
     path = folder / NEVER_ARRIVES
     kind = tuple[NeverArrives, ...]
     return tables.read_values(path, "restore it", groups=kind).groups if is_present(path) else ()
+
+
+def read_immobile(folder: Path) -> tuple[Immobile, ...]:
+    """Returns the people of a sequence folder who stood still on the way; () if it has no such file."""
+    path = folder / IMMOBILE
+    return tables.read_values(path, "restore it", people=tuple[Immobile, ...]).people if is_present(path) else ()
 
 
 CSV_COLUMNS = ("frame", "group", "members", "x", "y", "hull", "size")

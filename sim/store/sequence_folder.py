@@ -19,7 +19,7 @@ from sim.pictures.background_sample import BackgroundChoice
 from sim.pictures.stored_pictures import StoredPictures, write_pictures
 from sim.store import atomic, seal, tables, truth_files
 from sim.store.camera_files import camera_document, read_camera, read_scene, scene_document
-from sim.store.group_files import NEVER_ARRIVES
+from sim.store.group_files import IMMOBILE, NEVER_ARRIVES
 from sim.store.own_files import is_side_file
 from sim.store.recorded_sequence import recorded_sequence
 from sim.store.seal import MANIFEST, REDO, is_own_sequence, read_manifest
@@ -99,6 +99,8 @@ def sequence_files(
         files |= truth_files.truth_files(sequence.truth)
     if sequence.never_arrive:
         files[NEVER_ARRIVES] = tables.json_list("groups", map(asdict, sequence.never_arrive))
+    if sequence.immobile:
+        files[IMMOBILE] = tables.json_list("people", map(asdict, sequence.immobile))
     if found:
         files |= truth_files.detection_files(found, sequence.fps, sequence.scene)
     if found and sequence.load_owners is not None:

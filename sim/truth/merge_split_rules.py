@@ -1,7 +1,8 @@
 """The rules that say when two parts of a crowd have merged or split: the one home of their distances, speeds and times.
 
 Merged: nearest members less than 1.5 m apart, mean velocities differing by less than 0.5 m/s. Split: more than 2.5 m
-apart, or 1.5 m with velocities differing by more than 0.7 m/s. Both must hold for 2 s. `separation` measures two parts
+apart, or 1.5 m with velocities differing by more than 0.7 m/s. Both must hold for 2 s. Where a wall is between two
+people, their distance is that of walking round it. `separation` measures two parts
 over time; its methods apply the rules frame by frame; `holds_for` finds the frames from which a rule holds long enough.
 """
 
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.elementary import dot, length
+from sim.geometry.walls import distances_round
 from sim.truth.motion_rows import MotionRows
 from sim.types import Array, Bools, Ints, Near
 
@@ -58,14 +60,21 @@ class Separation:
         return np.isfinite(self.distance) & ((self.distance > SPLIT_DISTANCE) | leaving)
 
 
-def separation(pos: Array, vel: Array, a: Ints, b: Ints) -> Separation:
+def separation(pos: Array, vel: Array, a: Ints, b: Ints, walls: Array | None = None) -> Separation:
     """Returns the Separation of two parts of a crowd, the people in columns a and those in columns b, in each frame.
 
-    pos, vel (T, P, 2): m, m/s, nan while absent.
+    pos, vel (T, P, 2): m, m/s, nan while absent. walls (W, 2, 2), m: the distance is that of walking round them; None:
+    there are none.
     """
     gap = pos[:, a, None] - pos[:, None, b]
-    gap2 = dot(gap, gap).reshape(len(pos), -1)
-    gap2 = np.where(np.isnan(gap2), np.inf, gap2).min(axis=1, initial=np.inf)
+    gap2 = dot(gap, gap)
+    gap2 = np.where(np.isnan(gap2), np.inf, gap2)
+    if walls is not None and len(walls):
+        near = gap2 < SPLIT_DISTANCE * SPLIT_DISTANCE
+        t, i, j = np.nonzero(near)
+        way = distances_round(pos[t, a[i]], pos[t, b[j]], walls)
+        gap2[near] = way * way
+    gap2 = gap2.reshape(len(pos), -1).min(axis=1, initial=np.inf)
     difference = length(mean_of_present(vel[:, a]) - mean_of_present(vel[:, b]))
     return Separation(np.sqrt(gap2), np.where(np.isnan(difference), np.inf, difference))
 

@@ -23,6 +23,7 @@ class MotionRows:
     vel: Array  # (R, 2): m/s, nan if unknown
     group: Ints  # (R,): group id, -1 = alone
     length: int  # frames T of the sequence
+    walls: Array | None = None  # (W, 2, 2): m, round which people walk; None: there are none
     key: Ints = field(init=False)  # (R,): of person and frame, ascending
 
     def __post_init__(self) -> None:

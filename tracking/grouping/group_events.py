@@ -44,7 +44,7 @@ class TrackedMotion:
         """
         first = max(0, t + 1 - frames_of(SEARCHED, self.fps))
         pos, vel, _ = self.rows.window([*sorted(a), *sorted(b)], first, t + 1)
-        found = separation(pos, vel, *np.split(np.arange(len(a) + len(b)), [len(a)]))
+        found = separation(pos, vel, np.arange(len(a)), np.arange(len(a), len(a) + len(b)))
         there, apart = np.isfinite(found.distance), found.split_rule()
         # people more than 1.5 m apart may be in one group, too
         together = found.merge_rule() if joins else there & ~apart

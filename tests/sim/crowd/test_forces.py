@@ -14,7 +14,6 @@ from sim.crowd.forces import (
     QUEUE,
     SWAY_X,
     SWAY_Y,
-    WAYPOINT,
     GroupArrays,
     Obstacles,
     PeopleArrays,
@@ -34,7 +33,6 @@ def crowd(n: int, seed: int, side: float = 6.0) -> tuple[np.ndarray, PeopleArray
     people.tag[:, GROUP] = np.arange(n) // 3
     people.tag[:, MODE] = 0
     people.tag[:, QUEUE] = np.where(r.random(n) < 0.2, 0, -1)
-    people.tag[:, WAYPOINT] = 0
     people.place[:] = r.normal(0, 0.7, (n, 2))
     people.noise[:] = r.normal(0, 0.1, (n, 4))
     people.gait[:] = r.uniform(0, [1.0, 1.0, 0.2, 0.2, 0.04], (n, 5))

@@ -1,0 +1,78 @@
+"""Leads people round walls and through gates (doors, narrow gaps) while the simulation runs, each alone where the group
+cannot walk as one.
+
+A group walks in its formation while all members see its middle, and the middle sees the next point of the way. Else,
+and at a gate, it goes in file: each member walks to the next point of the way that they have not passed. Who does not
+see that point walks to the corner at which the shortest way there begins. Who is ahead waits for the last one, for 20
+s; from then on each walks alone. At a gate where two people cannot pass each other, and where two crowds meet at one
+that is no wider than 2.2 m, the sides take turns; in others people keep to the right while others come.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from sim.clock import SCRIPT_RATE
+from sim.crowd.group_state import GroupState
+from sim.elementary import length
+from sim.geometry.walls import blocked
+from sim.types import Array
+
+WAIT_TIME = 20.0  # s after which nobody waits for the group any more
+TOGETHER = 2.5  # m: people who see each other so near have not lost each other
+
+
+class Wayfinding:
+    """Who walks alone in one running simulation, and where to. State: gate_state: whose turn it is at each gate;
+    since (G,): s since which each group goes in file; parted: people have lost their groups."""
+
+    def __init__(self, groups: GroupState) -> None:
+        self.groups = groups
+        navigator = groups.navigator
+        self.gate_state = np.zeros((len(navigator.gates), 3))
+        self.parted = False
+        self.since = np.zeros(len(groups.arrays.length))
+
+    def advance(self, t: float, state: Array) -> bool:
+        """Decides at time t (s) who walks alone; returns True if `GroupState.rows` must be called afterwards.
+
+        state (P, 4): x, y, vx, vy by column, nan while absent.
+        """
+        groups, navigator = self.groups, self.groups.navigator
+        if not len(navigator.closed):
+            return False
+        from sim.crowd.wayfinding_kernels import find_ways
+
+        arrays = groups.arrays
+        waits = (groups.queue_of >= 0) | groups.held
+        changed, late = find_ways(
+            t, state, groups.present, waits, groups.group_of, groups.targets, groups.waypoint, groups.alone,
+            groups.aims, groups.share, groups.gone, arrays.route, arrays.kind, groups.gate, arrays.length,
+            arrays.current, arrays.filing, self.since, arrays.finish, navigator.nodes, navigator.far, navigator.closed,
+            navigator.first, self.gate_state, 1 / SCRIPT_RATE, WAIT_TIME,
+        )  # fmt: skip
+        if late or self.parted:
+            self._part_the_lost(t, state)
+        return bool(changed)
+
+    def _part_the_lost(self, t: float, state: Array) -> None:
+        """Marks who walks without the group from now on: those whom others of the group waited for in vain.
+
+        The people of a group who see each other within TOGETHER m remain together.
+        """
+        groups, arrays = self.groups, self.groups.arrays
+        groups.apart[:] = -1
+        self.parted = False
+        for g in np.flatnonzero(arrays.filing & (t - self.since >= WAIT_TIME)).tolist():
+            columns = [c for c in groups.members[g] if groups.present[c]]
+            pos = state[columns, :2]
+            near = length(pos[:, None] - pos) < TOGETHER
+            a, b = np.broadcast_arrays(pos[:, None], pos[None])
+            near &= ~blocked(a, b, groups.navigator.walls)
+            _, part = connected_components(near, directed=False)
+            if part.max(initial=0):
+                self.parted = True
+                for k in range(1, part.max() + 1):
+                    some = [c for c, p in zip(columns, part, strict=True) if p == k]
+                    groups.apart[some] = min(some)
