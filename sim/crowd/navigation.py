@@ -14,6 +14,7 @@ from sim.geometry.walls import blocked, wall_distances
 from sim.types import Array, Ints, Scene
 
 CLEARANCE = 0.6  # m kept from a wall's end on the way round it
+TOUCH = 0.01  # m: walls so near to each other meet
 
 
 def scene_of(world: WorldSpec) -> Scene:
@@ -21,7 +22,7 @@ def scene_of(world: WorldSpec) -> Scene:
     return Scene.of(world, *cut_walls(world))
 
 
-NARROW_GAP, LEAST_GAP = 1.3, 0.42  # m: a gap between walls of such a width is a gate, as a door is
+NARROW_GAP, LEAST_GAP = 2.5, 0.42  # m: a gap between walls of such a width is a gate, as a door is
 
 
 class Navigator:
@@ -50,11 +51,14 @@ class Navigator:
             self.far, self._before = dijkstra(between(self.nodes, self.closed, self.first), return_predecessors=True)
 
     def _gaps(self, doors: Array) -> Array:
-        """Returns the narrow gaps (K, 2, 2) between the end of a wall and another wall that no door fills."""
+        """Returns the narrow gaps (K, 2, 2) between the end of a wall and another one or the border, without doors."""
         found: list[Array] = []
+        (x, y), o = self.size, 0.0
+        border = np.array([[[o, o], [x, o]], [[x, o], [x, y]], [[x, y], [o, y]], [[o, y], [o, o]]])
+        solid = np.concatenate([self.walls, border])
         for k, wall in enumerate(self.walls):
             for end in wall:
-                for other in np.delete(self.walls, k, axis=0):
+                for other in np.delete(solid, k, axis=0):
                     along, off = other[1] - other[0], end - other[0]
                     foot = other[0] + np.clip(dot(off, along) / max(float(dot(along, along)), 1e-12), 0, 1) * along
                     gap, middle = np.stack([end, foot]), (end + foot) / 2
@@ -68,18 +72,32 @@ class Navigator:
                         continue
                     across = np.array([foot[1] - end[1], end[0] - foot[0]]) / length(foot - end)
                     sides = middle + CLEARANCE * np.stack([across, 0 * across, -across])
-                    if (wall_distances(sides[:, None], self.walls) > LEAST_GAP / 2.1).all():  # no corner, nor a wall
+                    if (wall_distances(sides[:, None], solid) > LEAST_GAP / 2.1).all():  # no corner, nor a wall
                         found.append(gap)
         return np.array(found).reshape(-1, 2, 2)
 
     def _wall_ends(self) -> Array:
         along = self.walls[:, 1] - self.walls[:, 0]
         along = along / length(along)[:, None]
-        ends = np.concatenate([self.walls[:, 0] - CLEARANCE * along, self.walls[:, 1] + CLEARANCE * along])
+        ends = np.concatenate(
+            [self.walls[:, 0] - CLEARANCE * along, self.walls[:, 1] + CLEARANCE * along, self._joints()]
+        )
         closed = self.closed.reshape(-1, 2, 2)
         free = (wall_distances(ends[:, None], closed) > 0.9 * CLEARANCE).all(axis=1)
         inside = ((ends >= 0) & (ends <= self.size)).all(axis=1)
         return np.asarray(ends[inside & free])
+
+    def _joints(self) -> Array:
+        """Returns points (J, 2) outside the corners at which two walls meet, on the line that halves the angle."""
+        found = []
+        for k, wall in enumerate(self.walls):
+            for other in self.walls[:k]:
+                for a, b in ((0, 0), (0, 1), (1, 0), (1, 1)):
+                    if float(length(wall[a] - other[b])) < TOUCH:
+                        away = sum((w[e] - w[1 - e]) / length(w[e] - w[1 - e]) for w, e in ((wall, a), (other, b)))
+                        if float(length(away)) > TOUCH:
+                            found.append(wall[a] + CLEARANCE * away / length(away))
+        return np.array(found).reshape(-1, 2)
 
     def way(self, start: Array, goal: Array) -> tuple[Array, Ints] | None:
         """Returns the points (K, 2) m to walk to, the goal last, and for each the gate that it lies in, -1 for none.
@@ -87,12 +105,15 @@ class Navigator:
         start, goal (2,): m. None if there is no way.
         """
         ends = np.stack([start, goal])
-        if not blocked(ends[:1], ends[1:], self.closed.reshape(-1, 2, 2))[0]:
-            return ends[1:], np.full(1, -1)
+        straight = ends[1:], np.full(1, -1)
+        if not len(self.closed):
+            return straight
+        from sim.crowd.wayfinding_kernels import in_sight, sees
+
+        if sees(start[0], start[1], goal[0], goal[1], self.closed, -1, -1):
+            return straight
         if not len(self.nodes):
             return None
-        from sim.crowd.wayfinding_kernels import in_sight
-
         here, there = in_sight(ends, self.nodes, self.closed, self.first)
         lengths = here[:, None] + self.far + there
         n, m = np.unravel_index(np.argmin(lengths), lengths.shape)

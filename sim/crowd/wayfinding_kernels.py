@@ -19,6 +19,7 @@ HOLDER, HELD, NEXT = range(3)
 BOTH = 2.0
 FREE = -1  # no gate
 
+TINY = 1e-9  # m²
 NEAR_GATE = 2.0  # m from a gate: a group goes on in file
 PASSED = 0.35  # m behind a gate: a person has passed it
 AIM_BEYOND, AIM_BEFORE = 0.6, 0.45  # m from a gate: where people walk to who are before its opening, or beside it
@@ -55,6 +56,8 @@ def sees(ax, ay, bx, by, closed, skip, also):  # type: ignore[no-untyped-def]
             continue
         ux, uy = bx - ax, by - ay
         s1, s2 = ux * (py - ay) - uy * (px - ax), ux * (qy - ay) - uy * (qx - ax)
+        if abs(s1) + abs(s2) < TINY:  # along the segment
+            return False
         wx, wy = qx - px, qy - py
         s3, s4 = wx * (ay - py) - wy * (ax - px), wx * (by - py) - wy * (bx - px)
         if s1 * s2 < 0.0 and s3 * s4 < 0.0:
@@ -409,7 +412,8 @@ def find_ways(  # type: ignore[no-untyped-def]
         if k >= 0:
             along, across, width = _across(gates, k, x, y)
             within = across * side[i] < PASSED and abs(along) < 0.5 * width
-            may = within or gate_state[k, HOLDER] == BOTH or gate_state[k, HOLDER] == side[i]
+            turn = within or gate_state[k, HOLDER] == BOTH or gate_state[k, HOLDER] == side[i]
+            may = turn or along * along + across * across > DEMAND * DEMAND
             against = opposed[k, 1 if side[i] > 0.0 else 0]
             aim[i, X], aim[i, Y], moves = _walk_through(gates, k, x, y, side[i], against, may)
             share[i] = 1.0 if moves else 0.0

@@ -11,6 +11,7 @@ from sim.clock import SCRIPT_RATE
 from sim.crowd.navigation import Navigator
 from sim.crowd.world import World
 from sim.geometry.walls import blocked
+from sim.truth.label import label
 from sim.types import Motion, Scene
 
 TOP = {"kind": "top", "fps": 5, "px_per_m": 10}
@@ -95,3 +96,38 @@ def test_who_has_lost_the_group_walks_alone_and_is_meant_to_be_alone() -> None:
     assert max(apart) > 1
     assert apart[0] == 1
     assert len(intents) / SCRIPT_RATE == pytest.approx(120, abs=0.2)
+
+
+OBSTACLES = {
+    "a triangle, whose corners are acute": [[8, 2, 14, 5], [14, 5, 8, 8], [8, 8, 8, 2]],
+    "a pocket, on the line of whose walls the ways lie": [[6, 2, 12, 2], [12, 2, 12, 8], [12, 8, 6, 8]],
+    "walls that leave 2 m to the border": [[6, 0, 6, 8], [10, 2, 10, 10], [14, 0, 14, 8]],
+}
+
+
+@pytest.mark.parametrize("walls", OBSTACLES.values(), ids=OBSTACLES)
+def test_groups_walk_round_obstacles_in_both_directions(walls: list[list[float]]) -> None:
+    there = {"id": "a", "size": 3, "start": [3, {"uniform": [3, 7]}], "goal": [17, 5], "at_goal": "leave", "repeat": 3}
+    back = there | {"id": "b", "start": [18, {"uniform": [3, 7]}], "goal": [2, 5]}
+    come = {"enter": {"uniform": [0, 15]}}
+    motion, _ = played(2, world={"size": [20, 10], "walls": walls}, group=[there | come, back | come], duration=80.0)
+    assert left_at_the_end(motion) == 0
+    assert crossings(motion) == 0
+
+
+def test_a_queue_behind_a_door_is_reached_from_afar_and_a_merge_too() -> None:
+    """Nobody near the door: it is nobody's turn, and all may come."""
+    world = {"size": [20, 10], "walls": [[10, 0, 10, 10]], "doors": [{"at": [10, 5], "width": 1.2}]}
+    queuers = {"id": "a", "size": 1, "start": [{"uniform": [1, 8]}, {"uniform": [1, 9]}], "goal": [3, 9], "repeat": 4}
+    queue = {
+        "id": "q", "type": "queue", "groups": ["a-*"], "at": [17, 5], "direction_deg": 180, "service": 2.0,
+        "goal": [4, 9], "at_goal": "leave", "when": {"time": 1.0},
+    }  # fmt: skip
+    motion, _ = played(2, world=world, group=[queuers], event=[queue])
+    assert left_at_the_end(motion) == 0
+    parts = [{"id": k, "size": 2, "start": [x, 3], "goal": [x, 3.2]} for k, x in (("a", 5), ("b", 15))]
+    merge = {"id": "m", "type": "merge", "groups": ["a", "b"], "into": "ab", "goal": [17, 8], "when": {"time": 2.0}}
+    motion, _ = played(0, world=world, group=parts, event=[merge])
+    end = motion.measured.pos[-1]
+    assert (end[:, 0] > 10).all()
+    assert [e.kind for e in label(motion, None).events] == ["merge"]
