@@ -148,8 +148,8 @@ class Tracks(Frozen):
         Example:
             return Tracks.of_boxes(frame, [t.id for t in found], [t.ltwh for t in found])
         """
-        box = np.asarray(box, float).reshape(-1, 4)
-        return cls.of_points(frame, id, box[:, :2] + box[:, 2:] / 2, score, plane="image", box=box, **more)
+        box = _rows(box, 4)
+        return cls.of_points(frame, id, box[..., :2] + box[..., 2:4] / 2, score, plane="image", box=box, **more)
 
     @classmethod
     def of_points(
@@ -165,16 +165,22 @@ class Tracks(Frozen):
             plane: In which `pos` lies: "ground", "image" or "space".
             **more: Further fields of `Tracks`, such as `vel` or `box`.
         """
-        pos = np.asarray(pos, float).reshape(-1, 3 if plane == "space" else 2)
-        n, dims = pos.shape
+        n, dims = np.size(id), 3 if plane == "space" else 2
         more = {"group": np.full(n, -1), "vel": np.full((n, dims), np.nan), **more}
         more = {"cov": np.tile(np.eye(2 * dims), (n, 1, 1)), "score": np.asarray(score, float), **more}
-        return cls(frame.index, frame.t, plane, "person", np.asarray(id) if n else no_ids(), pos=pos, **more)
+        ids, rows = np.asarray(id) if n else no_ids(), _rows(pos, dims)
+        return cls(frame.index, frame.t, plane, "person", ids, pos=rows, **more)
 
     @property
     def measured(self) -> Bools:
         """Flags (N,), True for each row measured in this frame: `seen`, or all True if `seen` is empty."""
         return self.seen if len(self.seen) else np.ones(len(self.id), bool)
+
+
+def _rows(values: Any, columns: int) -> Array:
+    """Returns values as floats in the shape that they have; of no values, no rows."""
+    rows = np.asarray(values, float)
+    return rows if rows.size else np.zeros((0, columns))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
