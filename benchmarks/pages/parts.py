@@ -35,8 +35,10 @@ def _commands(group: Any, prefix: str) -> Iterator[tuple[str, Any]]:
 
 def _command(name: str, command: Any) -> str:
     context = command.context_class(command, info_name=name)
-    records = (parameter.get_help_record(context) for parameter in command.params)
-    rows = [row(f"`{cell(option)}`", cell(text)) for option, text in filter(None, records)]
+    records = ((p.param_type_name, p.get_help_record(context)) for p in command.params)
+    # Of an argument Typer writes its type, too, as in `SOURCE <path>`.
+    named = [(r[0].partition(" <")[0] if kind == "argument" else r[0], r[1]) for kind, r in records if r]
+    rows = [row(f"`{cell(option)}`", cell(text)) for option, text in named]
     options = table("argument or option", "meaning", rows=rows)
     return f"## {name}\n\n{inspect.cleandoc(command.help)}\n\n{options}"
 
