@@ -140,7 +140,8 @@ def scores() -> str:
         core = f", `{s.key}_core`" if f"{s.key}_core" in found else ""
         kind = f"{'share' if s.unit == '1' else s.unit.replace('|', 'or')}, {low} to {high}, {s.better}"
         source = f" ({s.source})" if s.source else ""
-        rows.append(row(f"`{s.key}`{core}", f"{cell(s.meaning)}{source}", kind))
+        meaning = cell(s.meaning).replace("2 matched /", "2 [matched](#how-events-are-compared) /")
+        rows.append(row(f"`{s.key}`{core}", f"{meaning}{source}", kind))
     return table("key", "meaning (source)", "unit, range, better", rows=rows)
 
 
