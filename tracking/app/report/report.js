@@ -104,6 +104,7 @@ if (items.length) {
   for (const cell of document.querySelectorAll("[data-cell]")) cell.addEventListener("click", () => {
     filter({ name: cell.dataset.name, scenario: cell.dataset.scenario, kind: "" });
     $("moments").scrollIntoView({ behavior: "smooth" });
+    buttons()[0]?.focus({ preventScroll: true });
   });
   $("before").addEventListener("click", () => move(-1));
   $("after").addEventListener("click", () => move(1));

@@ -67,6 +67,8 @@ def test_open_filter_replay(page: Page) -> None:
     assert set(page.value(SHOWN)) == {"Bad"}
     page.value("[...document.querySelectorAll('#list li')].find(item => !item.hidden).querySelector('button').click()")
     page.wait(CLOCK)
+    heading = page.value("document.querySelector('iframe').contentDocument.querySelector('h1').textContent")
+    assert heading.startswith("merge-s0000")
     first = page.value(CLOCK)
     page.press("x")
     page.wait(f"{CLOCK} !== {first!r}")
