@@ -218,10 +218,12 @@ def _by_scenario(every: RankedRuns) -> tuple[dict[str, dict[str, float]], str]:
 def _score_differences(every: RankedRuns, pair: Mapping[str, Mapping[str, Any]]) -> str:
     known = [key for keys in TABLES.values() for key in keys if math.isfinite(pair[key]["mean"])]
     keys = [key for key in known if key != "objective" or usual_key(every.comparison) == key]
-    keys = [key for key in keys if not (key.endswith("_core") and _alike(pair[key], pair[key.removesuffix("_core")]))]
+    equal = {key for key in keys if key.endswith("_core") and _alike(pair[key], pair[key.removesuffix("_core")])}
+    keys = [key for key in keys if key not in equal]
+    left = ["core scores equal to the strict ones are left out"] if equal else []
     sure = [_chance(len(keys))] if _can_be_sure(every.comparison, every.key) else []
     title, rows = f"{pair[every.key]['run']} minus {pair[every.key]['minus']}", {arrow(k): (k, pair[k]) for k in keys}
-    return _difference_table(title, "score", rows, "; ".join([LOWER, *sure]))
+    return _difference_table(title, "score", rows, "; ".join([LOWER, *left, *sure]))
 
 
 def _alike(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:

@@ -50,6 +50,7 @@ def test_core_scores_stand_only_where_they_differ() -> None:
     text = printed(group_MOTA=(0.6, 0.4), group_MOTA_core=(0.7, 0.4), group_F1=(0.6, 0.4), group_F1_core=(0.6, 0.4))
     assert "group_MOTA_core" in text
     assert "group_F1_core" not in text
+    assert "core scores equal to the strict ones are left out" in text
 
 
 @pytest.fixture(scope="module")
