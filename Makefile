@@ -18,6 +18,7 @@ TESTS ?=
 
 demo: $(RUNTIME)
 	$(BIN)/flockscope demo $(DEMO)
+	@command -v flockscope > /dev/null || echo "for the command flockscope: source $(BIN)/activate"
 
 test: $(ENVIRONMENT)
 	$(BIN)/python -m pytest -q -n auto --durations=5 -m "not slow" $(TESTS)

@@ -21,6 +21,7 @@ from sim.arrays import no_ids as no_ids
 from sim.place import Camera as Camera
 from sim.place import Scene as Scene
 from sim.place import Stairs as Stairs
+from sim.stuck import Immobile, NeverArrives
 
 Plane = Literal["ground", "space", "image"]
 Unit = Literal["person", "group"]
@@ -148,8 +149,8 @@ class Tracks(Frozen):
         Example:
             return Tracks.of_boxes(frame, [t.id for t in found], [t.ltwh for t in found])
         """
-        box = np.asarray(box, float).reshape(-1, 4)
-        return cls.of_points(frame, id, box[:, :2] + box[:, 2:] / 2, score, plane="image", box=box, **more)
+        box = _rows(box, 4)
+        return cls.of_points(frame, id, box[..., :2] + box[..., 2:4] / 2, score, plane="image", box=box, **more)
 
     @classmethod
     def of_points(
@@ -165,16 +166,22 @@ class Tracks(Frozen):
             plane: In which `pos` lies: "ground", "image" or "space".
             **more: Further fields of `Tracks`, such as `vel` or `box`.
         """
-        pos = np.asarray(pos, float).reshape(-1, 3 if plane == "space" else 2)
-        n, dims = pos.shape
+        n, dims = np.size(id), 3 if plane == "space" else 2
         more = {"group": np.full(n, -1), "vel": np.full((n, dims), np.nan), **more}
         more = {"cov": np.tile(np.eye(2 * dims), (n, 1, 1)), "score": np.asarray(score, float), **more}
-        return cls(frame.index, frame.t, plane, "person", np.asarray(id) if n else no_ids(), pos=pos, **more)
+        ids, rows = np.asarray(id) if n else no_ids(), _rows(pos, dims)
+        return cls(frame.index, frame.t, plane, "person", ids, pos=rows, **more)
 
     @property
     def measured(self) -> Bools:
         """Flags (N,), True for each row measured in this frame: `seen`, or all True if `seen` is empty."""
         return self.seen if len(self.seen) else np.ones(len(self.id), bool)
+
+
+def _rows(values: Any, columns: int) -> Array:
+    """Returns values as floats in the shape that they have; of no values, no rows."""
+    rows = np.asarray(values, float)
+    return rows if rows.size else np.zeros((0, columns))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -205,45 +212,6 @@ class Order:
     after: tuple[tuple[int, ...], ...]
     time: float | None = None
     event: int | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class NeverArrives:
-    """A group of a simulated crowd that does not reach its goal, as in gt/never_arrives.json. group: its name in the
-    script. people: ids of its members. pos, goal: their mean place at the end, and the point that they do not reach, x,
-    y in m. no_way: True if walls and pillars leave a body no way; False if the group stood in the last 10 s. obstacle:
-    in words, what is in the straight way."""
-
-    group: str
-    people: tuple[int, ...]
-    pos: tuple[float, float]
-    goal: tuple[float, float]
-    no_way: bool
-    obstacle: str
-
-    @property
-    def words(self) -> str:
-        """The finding in one line."""
-        ways = {True: "a body of 0.4 m has no way", False: "it stood to the end on the way"}
-        places = f"from {list(self.pos)} to its goal {list(self.goal)}"
-        return f"group {self.group} never arrives: {ways[self.no_way]} {places}; in the way: {self.obstacle}"
-
-
-@dataclass(frozen=True, slots=True)
-class Immobile:
-    """A person of a simulated crowd who stood still for 10 s or more on the way, without an order to wait. person: id.
-    start, end: s after the first recorded frame. pos: the place at the start, x, y in m."""
-
-    person: int
-    start: float
-    end: float
-    pos: tuple[float, float]
-
-    @property
-    def words(self) -> str:
-        """The finding in one line."""
-        at = f"from {self.start:.1f} s at {list(self.pos)}"
-        return f"person {self.person} stood still for {self.end - self.start:.1f} s on the way, {at}"
 
 
 @dataclass(frozen=True, slots=True, eq=False)

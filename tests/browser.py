@@ -60,9 +60,10 @@ class Page:
             time.sleep(0.05)
 
     def press(self, key: str) -> None:
-        text = {"text": key} if len(key) == 1 else {}
+        more: dict[str, Any] = {"text": key} if len(key) == 1 else {}
+        more |= {"windowsVirtualKeyCode": 27} if key == "Escape" else {}  # dialogs look at the code
         for kind in ("keyDown", "keyUp"):
-            self.send("Input.dispatchKeyEvent", type=kind, key=key, **(text if kind == "keyDown" else {}))
+            self.send("Input.dispatchKeyEvent", type=kind, key=key, **(more if kind == "keyDown" else {}))
 
     def look(self, width: int, height: int, dark: bool = False) -> None:
         self.send(

@@ -6,6 +6,7 @@ Every name that users meet has its definition in a page.
 from __future__ import annotations
 
 import re
+import runpy
 from pathlib import Path
 
 import pyarrow.parquet as pq
@@ -79,6 +80,20 @@ def test_public_names_have_an_entry() -> None:
 
 def test_every_key_of_a_scenario_has_a_meaning() -> None:
     assert all(key["meaning"] for key in keys_of_scenarios())
+
+
+def test_pages_of_the_site() -> None:
+    """Commands are wrapped between options alone, pictures keep their place, captions have a level."""
+    finished = runpy.run_path(str(ROOT / "docs" / "conf.py"))["finished"]
+    block = '<div class="highlight-sh notranslate"><pre>stress a --search 48 --hold-out x-y</pre></div>'
+    shown = '<span class="option">--search</span> 48 <span class="option">--hold-out</span> x-y'
+    assert (
+        finished(block + "<p>--search</p>", ROOT)
+        == block.replace("--search 48 --hold-out x-y", shown) + "<p>--search</p>"
+    )
+    assert finished('<img alt="a" src="demo.png" />', ROOT / "docs").startswith('<img loading="lazy" width="1')
+    assert finished('<img src="guides/gate.svg" />', ROOT / "docs") == '<img src="guides/gate.svg" />'
+    assert 'aria-level="2"' in finished('<p class="caption" role="heading">Start</p>', ROOT)
 
 
 def columns(folder: Path) -> set[str]:

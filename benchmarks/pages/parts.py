@@ -35,8 +35,10 @@ def _commands(group: Any, prefix: str) -> Iterator[tuple[str, Any]]:
 
 def _command(name: str, command: Any) -> str:
     context = command.context_class(command, info_name=name)
-    records = (parameter.get_help_record(context) for parameter in command.params)
-    rows = [row(f"`{cell(option)}`", cell(text)) for option, text in filter(None, records)]
+    records = ((p.param_type_name, p.get_help_record(context)) for p in command.params)
+    # Of an argument Typer writes its type, too, as in `SOURCE <path>`.
+    named = [(r[0].partition(" <")[0] if kind == "argument" else r[0], r[1]) for kind, r in records if r]
+    rows = [row(f"`{cell(option)}`", cell(text)) for option, text in named]
     options = table("argument or option", "meaning", rows=rows)
     return f"## {name}\n\n{inspect.cleandoc(command.help)}\n\n{options}"
 
@@ -138,7 +140,8 @@ def scores() -> str:
         core = f", `{s.key}_core`" if f"{s.key}_core" in found else ""
         kind = f"{'share' if s.unit == '1' else s.unit.replace('|', 'or')}, {low} to {high}, {s.better}"
         source = f" ({s.source})" if s.source else ""
-        rows.append(row(f"`{s.key}`{core}", f"{cell(s.meaning)}{source}", kind))
+        meaning = cell(s.meaning).replace("2 matched /", "2 [matched](#how-events-are-compared) /")
+        rows.append(row(f"`{s.key}`{core}", f"{meaning}{source}", kind))
     return table("key", "meaning (source)", "unit, range, better", rows=rows)
 
 

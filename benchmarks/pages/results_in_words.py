@@ -33,9 +33,9 @@ def signed(cell: str) -> str:
     return f"{float(number(cell, 3)):+.2f}{' *' * cell.endswith('*')}".replace("-", "−")
 
 
-def comparisons() -> str:
-    """People, groups and speed beside other software."""
-    return "\n".join([_people(), _groups(), _speed()])
+def comparisons(docs: str = "docs/") -> str:
+    """People, groups and speed beside other software. docs: the folder of the docs, from the page."""
+    return "\n".join([_people(), _groups(), _speed()]).replace("](docs/", f"]({docs}")
 
 
 def _people() -> str:

@@ -15,7 +15,8 @@ function commandsOfThePage() {
     const rows = [...table.querySelectorAll("tbody tr")].map((row) => {
       const [word, ...rest] = row.cells[0].textContent.trim().split(" ");
       const help = row.cells[1].textContent.trim();
-      return { word, value: rest.join(" "), help, option: word.startsWith("--"), required: help.includes("[required]") };
+      const required = help.includes("[required]"), several = /several|Twice/.test(help);
+      return { word, value: rest.join(" "), help, option: word.startsWith("--"), required, several };
     });
     found.set(name, rows);
   }
@@ -26,16 +27,18 @@ function quoted(text) {
   return /^[\w@%+=:,./…-]+$/.test(text) ? text : `'${text.replaceAll("'", "'\\''")}'`;
 }
 
-function line(command, fields) {
+// The words of the command. An option that can be given several times is repeated for each word of its field.
+function wordsOf(command, fields) {
   const words = ["flockscope", command];
   for (const { row, input } of fields) {
     const value = input.value.trim();
     if (row.option && !row.value) words.push(...(input.checked ? [row.word] : []));
-    else if (row.option) words.push(...(value || row.required ? [row.word, value ? quoted(value) : row.value] : []));
+    else if (row.option && value) words.push(...(row.several ? value.split(/\s+/) : [value]).flatMap((one) => [row.word, quoted(one)]));
+    else if (row.option) words.push(...(row.required ? [row.word, row.value] : []));
     else if (value) words.push(...(row.word.includes("…") ? value.split(/\s+/) : [value]).map(quoted));
     else if (row.required) words.push(row.word.replace(/\|.*/, ""));
   }
-  return words.join(" ");
+  return words;
 }
 
 function build() {
@@ -50,7 +53,11 @@ function build() {
   const code = make("code", "", { "aria-live": "polite" });
   const copy = make("button", "copy", { type: "button" });
   let fields = [];
-  const write = () => { code.textContent = line(select.value, fields); copy.textContent = "copy"; };
+  const write = () => {
+    const words = wordsOf(select.value, fields).map((word) => make("span", word, word.startsWith("--") ? { class: "option" } : {}));
+    code.replaceChildren(...words.flatMap((word, k) => (k ? [" ", word] : [word])));
+    copy.textContent = "copy";
+  };
   const choose = () => {
     fields = commands.get(select.value).map((row) => {
       const flag = row.option && !row.value;

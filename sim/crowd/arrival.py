@@ -11,11 +11,13 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from sim.crowd.population import BODY_RADIUS
 from sim.elementary import length
 from sim.geometry.walls import blocked, wall_distances
-from sim.types import Array, Bools, Immobile, Ints, Scene
+from sim.stuck import Immobile
+from sim.types import Array, Bools, Ints, Scene
 
 CELL = 0.05  # m
 MOST_CELLS = 16_000_000  # in larger worlds only standing is found
@@ -102,26 +104,21 @@ def _numbers(values: object) -> str:
 def immobile_people(pos: Array, free: Bools, rate: float) -> tuple[Immobile, ...]:
     """Returns the people who stay within STAND_MOVE along x and y for STAND_TIME or more, while they are free to walk.
 
-    pos (C, P, 2): m, at C ticks, `rate` per s; nan while absent. free (C, P): False while something bids them wait.
+    They are looked at once a second. pos (C, P, 2): m, at C ticks, `rate` per s; nan while absent. free (C, P): False
+    while something bids them wait.
     """
-    from scipy.ndimage import maximum_filter1d, minimum_filter1d
-
-    width = round(STAND_TIME * rate) + 1
+    seconds = slice(None, None, round(rate))
+    pos, there, width = pos[seconds], (free & np.isfinite(pos[..., 0]))[seconds, :, None], round(STAND_TIME) + 1
     if len(pos) < width:
         return ()
-    there = free & np.isfinite(pos[..., 0])
-    high, low = (np.where(there[..., None], pos, away) for away in (np.inf, -np.inf))
-    half, middle = width // 2, {"size": width, "axis": 0, "mode": "nearest"}
-    spread = maximum_filter1d(high, **middle) - minimum_filter1d(low, **middle)
-    still = (spread < STAND_MOVE).all(axis=2)
-    still[:half] = still[len(still) - half :] = False
-    still = maximum_filter1d(still, **middle)
+    high, low = (sliding_window_view(np.where(there, pos, away), width, axis=0) for away in (np.inf, -np.inf))
+    still = (high.max(axis=-1) - low.min(axis=-1) < STAND_MOVE).all(axis=2)  # (S, P): for the seconds from then on
     found = []
     for p in np.flatnonzero(still.any(axis=0)):
         edge = np.flatnonzero(np.diff(still[:, p], prepend=False, append=False))
         for first, end in edge.reshape(-1, 2).tolist():
             x, y = pos[first, p].tolist()
-            found.append(Immobile(int(p) + 1, first / rate, (end - 1) / rate, (round(x, 2), round(y, 2))))
+            found.append(Immobile(int(p) + 1, float(first), float(end - 1 + width - 1), (round(x, 2), round(y, 2))))
     return tuple(found)
 
 

@@ -66,6 +66,11 @@ def sees(ax, ay, bx, by, closed, skip, also):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _apart(ax, ay, bx, by):  # type: ignore[no-untyped-def]
+    return sqrt((ax - bx) * (ax - bx) + (ay - by) * (ay - by))
+
+
+@njit(cache=True)
 def in_sight(points, nodes, closed, first):  # type: ignore[no-untyped-def]
     """Returns the distances (M, N), m, of points (M, 2) from nodes (N, 2); inf if a closed segment is between them.
 
@@ -76,7 +81,7 @@ def in_sight(points, nodes, closed, first):  # type: ignore[no-untyped-def]
     for i in range(len(points)):
         for n in range(len(nodes)):
             if sees(points[i, 0], points[i, 1], nodes[n, 0], nodes[n, 1], closed, first + n if n < gates else -1, -1):
-                out[i, n] = sqrt((nodes[n, 0] - points[i, 0]) ** 2 + (nodes[n, 1] - points[i, 1]) ** 2)
+                out[i, n] = _apart(nodes[n, 0], nodes[n, 1], points[i, 0], points[i, 1])
     return out
 
 
@@ -89,7 +94,7 @@ def between(nodes, closed, first):  # type: ignore[no-untyped-def]
         for j in range(i):
             a, b = first + i if i < gates else -1, first + j if j < gates else -1
             if sees(nodes[i, 0], nodes[i, 1], nodes[j, 0], nodes[j, 1], closed, a, b):
-                out[i, j] = sqrt((nodes[i, 0] - nodes[j, 0]) ** 2 + (nodes[i, 1] - nodes[j, 1]) ** 2)
+                out[i, j] = _apart(nodes[i, 0], nodes[i, 1], nodes[j, 0], nodes[j, 1])
                 out[j, i] = out[i, j]
     return out
 
@@ -107,7 +112,7 @@ def first_hop(x, y, tx, ty, gate, nodes, far, closed, first):  # type: ignore[no
         through = first + n if n < gates else -1
         if not sees(x, y, nodes[n, 0], nodes[n, 1], closed, through, -1):
             continue
-        here = sqrt((nodes[n, 0] - x) ** 2 + (nodes[n, 1] - y) ** 2)
+        here = _apart(nodes[n, 0], nodes[n, 1], x, y)
         if here >= best:
             continue
         for m in range(len(nodes)):
@@ -117,7 +122,7 @@ def first_hop(x, y, tx, ty, gate, nodes, far, closed, first):  # type: ignore[no
             if gate >= 0 and m == gate:
                 best, found = whole, n
                 continue
-            whole += sqrt((nodes[m, 0] - tx) ** 2 + (nodes[m, 1] - ty) ** 2)
+            whole += _apart(nodes[m, 0], nodes[m, 1], tx, ty)
             if whole < best and sees(tx, ty, nodes[m, 0], nodes[m, 1], closed, first + m if m < gates else -1, own):
                 best, found = whole, n
     return found
@@ -328,12 +333,12 @@ def _end_files(  # type: ignore[no-untyped-def]
 def _share_of_waiting(i, state, walks, group_of, waypoint, route, gates):  # type: ignore[no-untyped-def]
     """Returns the share of the speed of person i, who is ahead of others of the group and waits for them."""
     g, w, x, y = group_of[i], waypoint[i], state[i, X], state[i, Y]
-    own, gap = (route[g, w, X] - x) ** 2 + (route[g, w, Y] - y) ** 2, 0.0
+    own, gap = _apart(route[g, w, X], route[g, w, Y], x, y), 0.0
     for j in range(len(state)):
         if j != i and walks[j] and group_of[j] == g:
-            other = (route[g, w, X] - state[j, X]) ** 2 + (route[g, w, Y] - state[j, Y]) ** 2
+            other = _apart(route[g, w, X], route[g, w, Y], state[j, X], state[j, Y])
             if waypoint[j] < w or (waypoint[j] == w and other > own):
-                gap = max(gap, sqrt((state[j, X] - x) ** 2 + (state[j, Y] - y) ** 2))
+                gap = max(gap, _apart(state[j, X], state[j, Y], x, y))
     if gap <= AHEAD:
         return 1.0
     if gap > FAR_AHEAD:
@@ -423,5 +428,5 @@ def find_ways(  # type: ignore[no-untyped-def]
         if t - since[g] < wait_time:
             share[i] *= _share_of_waiting(i, state, walks, group_of, waypoint, route, gates)
         elif w == length[g] - 1 and kind[g, w] == END and finish[g] == LEAVE:
-            gone[i] = (route[g, w, X] - x) ** 2 + (route[g, w, Y] - y) ** 2 < LEAVE_RADIUS * LEAVE_RADIUS
+            gone[i] = _apart(route[g, w, X], route[g, w, Y], x, y) < LEAVE_RADIUS
     return True, late

@@ -35,7 +35,8 @@ from sim.elementary import cos, length, sin
 from sim.geometry.walls import blocked
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.scene.terrain import flight_rows
-from sim.types import Array, Bools, Ints, Motion, NeverArrives, Scene, States
+from sim.stuck import NeverArrives
+from sim.types import Array, Bools, Ints, Motion, Scene, States
 
 STEP_TIME = 1 / PHYSICS_RATE  # s
 OVERLAP_LEFT = 0.0012600931512018426  # 0.875^50: share of an overlap of bodies that is left after 1 s, 0.875 a step.

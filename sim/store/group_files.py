@@ -27,7 +27,8 @@ from sim.arrays import joined, no_ids
 from sim.store import tables
 from sim.store.numeric_text import is_number_text, read_number, read_rows, read_text, whole_or_number
 from sim.store.tables import AXES, EXTENT, Count, FrameNumber, Id, Number, Pair, StoredTable, along, validated
-from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Immobile, Ints, Near, NeverArrives, Order
+from sim.stuck import Immobile, NeverArrives
+from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Near, Order
 
 NEAR_COLUMNS = "start,end,a,b"
 NEVER_ARRIVES, IMMOBILE = "gt/never_arrives.json", "gt/immobile.json"

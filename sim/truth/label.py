@@ -16,11 +16,12 @@ from sim.clock import FrameTicks
 from sim.scene.body import Ellipsoids, Outlines, RecordedBodies, contour, outlines, recorded_bodies
 from sim.scene.camera import project, px_per_m_at_centre
 from sim.scene.visibility import measure_visibility
+from sim.stuck import Immobile
 from sim.truth.group_hulls import groups_in_hulls, groups_over_time
 from sim.truth.merge_split_events import GroupsAndEvents
 from sim.truth.motion_rows import MotionRows
 from sim.truth.order_fulfilment import fulfilment
-from sim.types import Array, Camera, GroupEvent, Groups, Immobile, Ints, Motion, Near, Order, Truth
+from sim.types import Array, Camera, GroupEvent, Groups, Ints, Motion, Near, Order, Truth
 
 POINTS = 24  # vertices of each polygon
 INSTANT = 0.02  # s: half the step by which ground velocities become image velocities

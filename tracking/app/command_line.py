@@ -18,7 +18,7 @@ from collections.abc import Callable
 from contextlib import nullcontext, redirect_stdout
 from dataclasses import fields
 from importlib import import_module
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, get_args, get_type_hints
 
 import typer
 from typer.core import TyperCommand
@@ -54,7 +54,8 @@ def add_command(app: typer.Typer, name: str, options: type, target: str) -> None
 
     types, keyword = get_type_hints(options), inspect.Parameter.KEYWORD_ONLY
     own_first = sorted(fields(options), key=lambda f: f.name not in inspect.get_annotations(options))
-    parameters = [signature_parameter(f, keyword, Annotated[types[f.name], _declared(f)]) for f in own_first]
+    annotated = [(f, types[f.name]) for f in own_first]
+    parameters = [signature_parameter(f, keyword, Annotated[kind, _declared(f, kind)]) for f, kind in annotated]
     parameters.append(inspect.Parameter("json", keyword, default=False, annotation=JSON))
     made: Any = command
     made.__signature__, made.__doc__ = inspect.Signature(parameters), options.__doc__
@@ -62,10 +63,11 @@ def add_command(app: typer.Typer, name: str, options: type, target: str) -> None
     app.command(name, cls=StrictCommand)(made)
 
 
-def _declared(f: Any) -> Any:
-    m = f.metadata
+def _declared(f: Any, kind: Any) -> Any:
+    m, kinds = f.metadata, (kind, *get_args(kind))
+    number = "N" if int in kinds else "X" if float in kinds else None
     flag = f"--{f.name.replace('_', '-')}" if m["flag"] is None else m["flag"]
-    more = {"metavar": m["metavar"], "help": m["help"], "min": m["low"], "max": m["high"]}
+    more = {"metavar": m["metavar"] or number, "help": m["help"], "min": m["low"], "max": m["high"]}
     return typer.Option(flag, **more) if flag else typer.Argument(**more)
 
 

@@ -135,7 +135,7 @@ class DemoOptions(Options, words="demo"):
 class ScenariosOptions(Options, words="scenarios"):
     """List scenarios and suites, or explain one with a drawing."""
 
-    name: str | None = ARGUMENT("Scenario, *.toml file or suite to explain.", None)
+    name: str | None = ARGUMENT("Scenario, *.toml file or suite to explain.", None, metavar="NAME")
     settings: list[str] = SET()
     out: Path | None = option("Write a drawing of the plan, with the orders.", None, metavar="FILE.svg")
 

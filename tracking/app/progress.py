@@ -21,6 +21,8 @@ PATIENCE = 2.0  # s before anything is shown.
 
 PAUSE = 10.0  # s between lines if stderr is no terminal.
 
+SURE_SHARE = 0.05  # of all items: fewer tell nothing of the pace.
+
 
 def total_frames(sequences: Iterable[Sequence]) -> int | None:
     """Returns the number of frames of all sequences, None if one of them does not know its length."""
@@ -37,8 +39,8 @@ class ProgressMeter:
     def __init__(self, what: str, total: int | None = None) -> None:
         self.what, self.total, self.done, self.item = what, total, 0, ""
         self._bar: Progress | None = None
-        self._began = time.monotonic()
-        self._last_line = self._began + PATIENCE - PAUSE
+        self._first: tuple[float, int] | None = None  # when the first items were done, which compile code, and how many
+        self._last_line = time.monotonic() + PATIENCE - PAUSE
         self._timer = threading.Timer(PATIENCE, self._show)
         self._lock = threading.Lock()
 
@@ -64,6 +66,8 @@ class ProgressMeter:
         raise_if_interrupted()
         total = total if total is None or done <= total else None  # a budget can be exceeded
         self.done, self.total, self.item = done, total, printable(item)
+        if self._first is None and done:
+            self._first = time.monotonic(), done
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], completed=done, total=total, item=self.item, left=self._left())
         elif not sys.stderr.isatty() and time.monotonic() - self._last_line > PAUSE:
@@ -72,10 +76,11 @@ class ProgressMeter:
             print(*filter(None, words), file=sys.stderr)
 
     def _left(self) -> str:
-        """Returns in words how long the rest takes at the pace so far, "" if that is unknown."""
-        if not self.total or not self.done:
+        """Returns in words how long the rest takes at the pace since the first items, "" if that is unknown."""
+        if not self.total or self._first is None or self.done - self._first[1] < SURE_SHARE * self.total:
             return ""
-        seconds = (time.monotonic() - self._began) * (self.total - self.done) / self.done
+        began, first = self._first
+        seconds = (time.monotonic() - began) * (self.total - self.done) / (self.done - first)
         return f"({int(seconds) // 60}:{int(seconds) % 60:02} left)" if seconds >= 1 else ""
 
     def _show(self) -> None:

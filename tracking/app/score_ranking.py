@@ -139,8 +139,14 @@ def _last_lines(every: RankedRuns) -> Iterable[str]:
     yield from verdict(c, every.key)
     yield from every.notes
     match = next(iter(c.scores.values()))[0].group_match
+    yield f"{every.key}: {CATALOGUE[every.key].meaning}"
+    events = [row.get("event_F1", math.nan) for row in every.table]
+    if "event_F1" in shown_columns(every.table, every.key) and any(map(math.isnan, events)):
+        yield "event_F1 without true events: – reported none either, 0 only false ones"
     yield f"people compared by {SIMILARITY[c.similarity]}, groups by {GROUP_MATCH[match]}"
-    yield "oracle: true ids on the same input, without false alarms"
+    yield (
+        "oracle: true ids on the same input, without false alarms; it fills no gaps, so trackers that do may score more"
+    )
     if any(name.endswith(MATCHED) for name in c.oracles):
         yield "matched: the detections do not tell whose they are, so that they count for the people nearest to them"
 
@@ -158,7 +164,10 @@ def _ranking_table(every: RankedRuns) -> str:
     numbers, title = [arrow(every.key), "95 % interval", *keys], f"ranking by {every.key}, {of}"
     if len(inputs) == 1:
         return table(f"{title}, input {inputs[0]}", ["rank", "run"], numbers, rows)
-    foot = "runs that got different inputs: a rank compares trackers with their inputs"
+    foot = (
+        "runs that got different inputs: a rank compares trackers with their inputs; to compare trackers alone, give "
+        "all the same input (--detections, a class's needs)"
+    )
     return table(f"{title}, {len(inputs)} different inputs", ["rank", "run"], numbers, rows, ["input"], foot)
 
 
@@ -209,9 +218,17 @@ def _by_scenario(every: RankedRuns) -> tuple[dict[str, dict[str, float]], str]:
 def _score_differences(every: RankedRuns, pair: Mapping[str, Mapping[str, Any]]) -> str:
     known = [key for keys in TABLES.values() for key in keys if math.isfinite(pair[key]["mean"])]
     keys = [key for key in known if key != "objective" or usual_key(every.comparison) == key]
+    equal = {key for key in keys if key.endswith("_core") and _alike(pair[key], pair[key.removesuffix("_core")])}
+    keys = [key for key in keys if key not in equal]
+    left = ["core scores equal to the strict ones are left out"] if equal else []
     sure = [_chance(len(keys))] if _can_be_sure(every.comparison, every.key) else []
     title, rows = f"{pair[every.key]['run']} minus {pair[every.key]['minus']}", {arrow(k): (k, pair[k]) for k in keys}
-    return _difference_table(title, "score", rows, "; ".join([LOWER, *sure]))
+    return _difference_table(title, "score", rows, "; ".join([LOWER, *left, *sure]))
+
+
+def _alike(one: Mapping[str, Any], other: Mapping[str, Any]) -> bool:
+    ends = [[found[part] for part in ("mean", "low", "high")] for found in (one, other)]
+    return np.array_equal(ends[0], ends[1], equal_nan=True)
 
 
 def _difference_table(title: str, first: str, rows: Mapping[str, tuple[str, Mapping[str, Any]]], foot: str = "") -> str:

@@ -5,8 +5,9 @@ matched is a *gap*.
 
     late        a gap before the first match of the person: the track was confirmed late
     miss        a gap after which the person is not matched again: the track ended early, or there never was one
-    fragment    a gap between two matches with the same track
-    switch      a match with another track than in the match before, after a gap or without one
+    fragment    a gap between two matches with the same track: the track flickers
+    switch      a match with another track than in the match before, after a gap or without one; where two people swap
+                ids, there are two
     ghost       a stretch of frames in which a track is reported and not matched
 
 The number of switches is IDSW, that of fragments and of switches after a gap is Frag. The frames of all gaps sum to FN,

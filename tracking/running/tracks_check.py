@@ -81,9 +81,10 @@ def _faults(tracks: Any, index: int, history: ReportHistory) -> Iterator[Any]:
     good = tracks.own_events == own and isinstance(own, tuple) and set(own) <= set(EVENT_KINDS)
     yield not good and (f"own_events {tracks.own_events!r}", kinds)
     n, d = np.size(tracks.id), 3 if tracks.plane == "space" else 2
-    rows = {"id": ("i", n), "group": ("i", n), "seen": ("b", n), "score": ("f", n), "pos": ("f", n, d)}
-    rows |= {"vel": ("f", n, d), "cov": ("f", n, 2 * d, 2 * d)}
-    yield from _array_faults(tracks, "", rows if tracks.box is None else {**rows, "box": ("f", n, 4)}, ("vel",))
+    # Boxes before positions, which `Tracks.of_boxes` takes from them.
+    rows = {"id": ("i", n)} | ({} if tracks.box is None else {"box": ("f", n, 4)}) | {"pos": ("f", n, d)}
+    rows |= {"group": ("i", n), "seen": ("b", n), "score": ("f", n)}
+    yield from _array_faults(tracks, "", rows | {"vel": ("f", n, d), "cov": ("f", n, 2 * d, 2 * d)}, ("vel",))
     same = tracks.unit != "group" or np.array_equal(tracks.id, tracks.group)
     yield not same and ("group that is not id", "group equal to id where the unit is group")
     yield bool((tracks.group < -1).any()) and (f"group {tracks.group.min()}", "non-negative groups, -1 alone")

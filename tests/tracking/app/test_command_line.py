@@ -24,6 +24,20 @@ OPTIONS = [
 ONCE = list({option: (words, option, flag) for words, option, flag, several in OPTIONS if not several}.values())
 
 
+def test_an_option_names_its_value_in_plain_words() -> None:
+    """Choices are shown as they are; of other values no type of Python."""
+    shown = {
+        param.opts[0]: param.display_type_rich(command.context_class(command))
+        for command in commands().values()
+        for param in command.params
+        if param.param_type_name == "option" and not param.is_flag
+    }
+    assert shown["--workers"] == "N"
+    assert shown["--fps"] == "X"
+    assert shown["--similarity"] == "<boxes|ground|image>"
+    assert not [value for value in shown.values() if re.search("int|float|str|path|list", value)]
+
+
 @pytest.mark.parametrize(("words", "option", "flag"), ONCE, ids=lambda value: str(value).replace(" ", ""))
 def test_an_option_given_twice_is_refused(words: tuple[str, ...], option: str, flag: bool, capsys) -> None:
     given = [option] if flag else [option, "3"]

@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from scenarios.errors import WorkError
-from sim.types import GroupEvent, Groups, Tracks
+from sim.types import Frame, GroupEvent, Groups, Tracks
 from tracking.running.tracks_check import ReportHistory, check_tracks
 
 SQUARE = np.array([[0.0, 0], [1, 0], [1, 1]])
+FRAME = Frame(3, 0.2)
 
 
 def group(**changes):
@@ -147,6 +148,26 @@ def test_a_tracker_may_use_its_arrays_again():
         assert type(array) is np.ndarray
         assert array.base is None
         assert not array.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (Tracks.of_points(FRAME, [1, 2], np.zeros((2, 3))), r"pos of shape \(2, 3\), float64; expected \(2, 2\)"),
+        (Tracks.of_points(FRAME, [1, 2], np.zeros((3, 2))), r"pos of shape \(3, 2\), float64; expected \(2, 2\)"),
+        (Tracks.of_points(FRAME, [1, 2], np.zeros(4)), r"pos of shape \(4,\), float64; expected \(2, 2\)"),
+        (Tracks.of_boxes(FRAME, [1, 2], np.zeros((2, 5))), r"box of shape \(2, 5\), float64; expected \(2, 4\)"),
+        (Tracks.of_boxes(FRAME, [1, 2], np.zeros((3, 4))), r"box of shape \(3, 4\), float64; expected \(2, 4\)"),
+    ],
+)  # fmt: skip
+def test_the_array_of_the_wrong_shape_is_named(made, words):
+    refused(made, words)
+
+
+@pytest.mark.parametrize("nobody", [[], np.zeros((0, 2)), np.zeros((0, 4))])
+def test_nobody_needs_no_shape(nobody):
+    assert check(Tracks.of_points(FRAME, [], nobody)).pos.shape == (0, 2)
+    assert check(Tracks.of_boxes(FRAME, [], nobody)).box.shape == (0, 4)
 
 
 def test_without_seen_all_are_measured():

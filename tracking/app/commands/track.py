@@ -39,7 +39,7 @@ ROW_KEYS = (
 
 
 def track(options: TrackOptions) -> CommandResult:
-    """Tracks every sequence of the source and stores the tracks; returns a line for each run."""
+    """Tracks every sequence of the source and stores the tracks; returns a line for each input."""
     from sim.store.atomic import lock_folder
 
     setup = _setup(options)
@@ -63,7 +63,7 @@ def track(options: TrackOptions) -> CommandResult:
             with setup.limited or nullcontext(), ProgressMeter("track", total_frames(sequences)) as meter:
                 for sequence, folder in zip(sequences, folders, strict=True):
                     rows.append(_track_sequence(setup, sequence, folder, partial(_step, meter, sequence.name)))
-    return CommandResult({"tracker": setup.tracker, "runs": rows}, "\n".join(map(_line, rows)))
+    return CommandResult({"tracker": setup.tracker, "runs": rows}, "\n".join(_lines(rows, options.out)))
 
 
 def _step(meter: ProgressMeter, name: str, _: int) -> None:
@@ -133,6 +133,23 @@ def _row(run: TrackingRun, folder: Path) -> dict[str, Any]:
     tracks = len({id for t in run for id in t.id.tolist()})
     count = {"tracks": tracks, "groups": len(groups), "lasting_groups": lasting(groups)}
     return {**{key: run.info[key] for key in ROW_KEYS}, **count, "folder": folder}
+
+
+def _lines(rows: list[dict[str, Any]], out: str | Path) -> list[str]:
+    """Returns a line of text for all runs with the same input."""
+    by_input = dict[str, list[dict[str, Any]]]()
+    for row in rows:
+        by_input.setdefault(input_summary(row), []).append(row)
+    return [_line(alike[0] if len(alike) == 1 else _together(alike, out)) for alike in by_input.values()]
+
+
+def _together(rows: list[dict[str, Any]], out: str | Path) -> dict[str, Any]:
+    """Returns runs with the same input as one row: their sums, and their mean speed by frame."""
+    sums = {key: sum(row[key] for row in rows) for key in ("frames", "tracks", "groups", "lasting_groups")}
+    for key in ("frames_per_second", "whole_frames_per_second"):
+        seconds = sum(row["frames"] / row[key] for row in rows if row[key])
+        sums[key] = sums["frames"] / seconds if seconds else 0.0
+    return {**rows[0], **sums, "sequence": counted(len(rows), "sequence"), "folder": out}
 
 
 def _line(row: dict[str, Any]) -> str:

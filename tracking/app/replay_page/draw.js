@@ -92,13 +92,15 @@ function label(ctx, text, x, y, colour, bold, slanted) {
   ctx.fillText(text, x, y);
 }
 
-// Writes a label at one of several centres, the preferred first: the one that covers least of the boxes in `taken`.
-// spots: takes the label's half width and half height and returns the centres.
-function placeLabel(ctx, taken, text, spots, colour, slanted, bold) {
+// Writes a label inside a pane at one of several centres, the preferred first: the one that covers least of the boxes in
+// `pane.taken`. spots: takes the label's half width and half height and returns the centres.
+function placeLabel(pane, text, spots, colour, slanted, bold) {
+  const { ctx, taken, width, height } = pane;
   ctx.font = font(bold, slanted);
   const half = [ctx.measureText(text).width / 2 + 1, bold ? 7 : 6];
   let best = null, least = Infinity;
-  for (const [x, y] of spots(half)) {
+  for (const spot of spots(half)) {
+    const x = clampTo(spot[0], half[0], width), y = clampTo(spot[1], half[1], height);
     const box = [x - half[0], y - half[1], x + half[0], y + half[1]];
     const covered = taken.reduce((sum, other) => sum + overlapArea(box, other), 0);
     if (covered < least) [best, least] = [box, covered];
@@ -106,6 +108,22 @@ function placeLabel(ctx, taken, text, spots, colour, slanted, bold) {
   }
   taken.push(best);
   label(ctx, text, best[0] + half[0], best[3] - 2, colour, bold, slanted);
+}
+
+// The centres for the label of a hull: in its middle x or beside that, at one end y of the hull, else at the other.
+function hullSpots(x, ends) {
+  return ([w]) => ends.flatMap(y => [[x, y], [x + 2 * w, y], [x - 2 * w, y]]);
+}
+
+// The coordinate nearest to x at which something of half width w lies inside 0 to width.
+function clampTo(x, w, width) {
+  return Math.min(Math.max(x, w), width - w);
+}
+
+// Whether a pane shows something of what has these corners.
+function shownIn({ width, height }, points) {
+  const us = points.map(p => p[0]), vs = points.map(p => p[1]);
+  return Math.max(...us) >= 0 && Math.min(...us) <= width && Math.max(...vs) >= 0 && Math.min(...vs) <= height;
 }
 
 function overlapArea(a, b) {
@@ -207,16 +225,18 @@ function drawErrorsHere({ ctx, frame }, shown, r, reach) {
   }
 }
 
+// Draws a pane and its title. draw: takes the list of boxes that labels keep clear of, which is that of the title.
 function inPane(ctx, x, y, width, height, title, draw) {
   ctx.save();
   ctx.beginPath();
   ctx.rect(x, y, width, height);
   ctx.clip();
   ctx.translate(x, y);
-  draw();
+  ctx.font = font(true);
+  const wide = ctx.measureText(title).width;
+  draw(title ? [[0, 0, wide + 16, 26]] : []);
   if (title) {
-    ctx.font = font(true);
-    label(ctx, title, 10 + ctx.measureText(title).width / 2, 19, theme.ink, true);
+    label(ctx, title, 10 + wide / 2, 19, theme.ink, true);
     ctx.fillStyle = theme.thing;
     ctx.fillRect(x ? 0 : width - 1, 0, 1, height);
   }

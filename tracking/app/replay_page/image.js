@@ -4,9 +4,9 @@ function drawImage(canvas, frame, options) {
   const [imageWidth, imageHeight] = data.image;
   const parts = splitPanes(sides.filter(side => options[side.name]), options.beside);
   drawPanes(canvas, parts.length, imageHeight / imageWidth, (k, ctx, x, y, w, h) => {
-    inPane(ctx, x, y, w, h, paneTitle(parts, parts[k]), () => {
+    inPane(ctx, x, y, w, h, paneTitle(parts, parts[k]), taken => {
       const overPicture = options.video && (player ? player.draw(ctx, w, h) : drawBackground(ctx, w, h));
-      imagePane({ ctx, width: w, height: h, scale: w / imageWidth, frame, options, overPicture, taken: [] }, parts[k]);
+      imagePane({ ctx, width: w, height: h, scale: w / imageWidth, frame, options, overPicture, taken }, parts[k]);
     });
   });
 }
@@ -61,10 +61,10 @@ function boxOf(source, row, scale) {
   return Number.isNaN(box[0]) ? null : box;
 }
 
-function drawImageBoxes({ ctx, scale, frame, options, overPicture, taken }, side) {
-  const rows = side.rows(frame), { tracked } = side;
-  const ids = options.ids && rows.length <= MANY;
+function drawImageBoxes(pane, side) {
+  const { ctx, scale, frame, options, overPicture } = pane, rows = side.rows(frame), { tracked } = side;
   for (const row of rows) {
+    const ids = options.ids && rows.length <= MANY && shownIn(pane, cornersOf(side, row, scale));
     const colour = rowColour(side, row, options.by), box = boxOf(side, row, scale);
     ctx.strokeStyle = colour;
     ctx.lineWidth = tracked ? 2.4 : 1.8;
@@ -81,7 +81,7 @@ function drawImageBoxes({ ctx, scale, frame, options, overPicture, taken }, side
       const y = tracked ? box[1] + box[3] + 8 : box[1] - 8, away = tracked ? 12 : -12;
       const places = [0.5, 0, 1].map(share => [box[0] + share * box[2], y]);
       const spots = () => [...places, ...places.map(([x]) => [x, y + away])];
-      if (ids) placeLabel(ctx, taken, side.id[row], spots, colour, tracked);
+      if (ids) placeLabel(pane, side.id[row], spots, colour, tracked);
     } else if (side.plane === "image") {
       ctx.beginPath();
       ctx.arc(side.x[row] * scale, side.y[row] * scale, 6, 0, 2 * Math.PI);
@@ -97,7 +97,7 @@ function drawImageBoxes({ ctx, scale, frame, options, overPicture, taken }, side
         ctx.lineWidth = 2;
       }
       const spots = ([p, q]) => [[0, 1], [1, 0], [-1, 0]].map(([a, b]) => [ring[6][0] + a * (p + 10), ring[18][1] + b * (q + 3)]);
-      if (ids && ring.length) placeLabel(ctx, taken, side.id[row], spots, colour, tracked);
+      if (ids) placeLabel(pane, side.id[row], spots, colour, tracked);
     }
   }
   ctx.setLineDash([]);
@@ -112,18 +112,17 @@ function strokeBoxRim(ctx, box, colour) {
   ctx.lineWidth -= 2;
 }
 
-function drawImageHulls({ ctx, scale, frame, options, taken }, side) {
-  const { tracked } = side;
+function drawImageHulls(pane, side) {
+  const { ctx, scale, frame, options } = pane, { tracked } = side;
   for (const [id, rows] of groupsAt(side, frame)) {
     const points = rows.flatMap(row => cornersOf(side, row, scale));
     if (!points.length) continue;
     roundedPath(ctx, points, tracked ? 8 : 5);
     drawRegion(ctx, colourOf(id), tracked);
-    if (!options.ids) continue;
+    if (!options.ids || !shownIn(pane, points)) continue;
     const x = points.reduce((a, p) => a + p[0], 0) / points.length;
-    const y = tracked ? Math.max(...points.map(p => p[1])) + 24 : Math.min(...points.map(p => p[1])) - 18;
-    label(ctx, side.letter + id, x, Math.max(y, 14), colourOf(id), true);
-    taken.push([x - 10, Math.max(y, 14) - 12, x + 10, Math.max(y, 14) + 2]);
+    const vs = points.map(p => p[1]), ends = [Math.min(...vs) - 23, Math.max(...vs) + 19];
+    placeLabel(pane, side.letter + id, hullSpots(x, tracked ? ends.reverse() : ends), colourOf(id), false, true);
   }
 }
 

@@ -217,6 +217,7 @@ function buildHead() {
   for (const side of [tracks, other]) if (side) {
     about.push(`${new Set(side.id).size} ${side.groupRows ? "groups" : "people"} by ${side === other ? data.other.tracker : data.tracker}`);
   }
+  document.querySelector("h1").textContent = data.name; // all moments of a report have one title
   $("about").textContent = about.join(" · ");
   $("plan-note").textContent = hasPlan && tracks && truth ? planNote() : "";
   $("image-note").textContent = hasImage && tracks && truth ? "true: solid · tracked: dashed · detected: dotted boxes" : "";
@@ -298,7 +299,7 @@ function listen() {
   const drag = event => {
     if (!(event.buttons & 1)) return;
     const left = $("timeline").firstChild.getBoundingClientRect().left;
-    if (event.clientX - left > GUTTER - 8) jump(line.frameAt(event.clientX - left));
+    if (event.clientX - left > gutter - 8) jump(line.frameAt(event.clientX - left));
   };
   $("timeline").addEventListener("pointerdown", drag);
   $("timeline").addEventListener("pointermove", drag);

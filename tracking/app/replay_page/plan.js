@@ -59,11 +59,11 @@ function drawPlan(canvas, frame, options) {
   const panes = splitPanes(there, options.beside).length;
   const aspect = (hasImage && !data.opening ? data.image[1] / data.image[0] : own) * parts.length / panes;
   drawPanes(canvas, parts.length, aspect, (k, ctx, x, y, w, h) => {
-    inPane(ctx, x, y, w, h, paneTitle(parts, parts[k]), () => planPane(ctx, w, h, parts[k], frame, options));
+    inPane(ctx, x, y, w, h, paneTitle(parts, parts[k]), taken => planPane(ctx, w, h, parts[k], frame, options, taken));
   });
 }
 
-function planPane(ctx, width, height, shown, frame, options) {
+function planPane(ctx, width, height, shown, frame, options, taken) {
   const [x0, y0, x1, y1] = data.bounds;
   const scale = zoom.times * Math.min((width - 16) / (x1 - x0), (height - 16) / (y1 - y0));
   const [cx, cy] = zoom.times > 1 ? zoom.centre : [(x0 + x1) / 2, (y0 + y1) / 2];
@@ -72,9 +72,9 @@ function planPane(ctx, width, height, shown, frame, options) {
   Object.assign(zoom, { scale, width, height, centre: [cx, cy] });
   ctx.fillStyle = theme.ground;
   ctx.fillRect(0, 0, width, height);
-  drawGrid(ctx, map, scale, [cx - reach[0], cy - reach[1], cx + reach[0], cy + reach[1]]);
+  const plan = { ctx, map, width, height, scale, frame, options, taken };
+  drawGrid(plan, [cx - reach[0], cy - reach[1], cx + reach[0], cy + reach[1]]);
   if (data.scene) drawScene(ctx, map, scale);
-  const plan = { ctx, map, width, height, scale, frame, options, taken: [] };
   const people = shown.filter(side => !side.groupRows), wholeGroups = shown.filter(side => side.groupRows);
   if (options.hulls) for (const side of people) drawPlanHulls(plan, side);
   for (const side of wholeGroups) drawWholeGroups(plan, side, map);
@@ -87,7 +87,7 @@ function planPane(ctx, width, height, shown, frame, options) {
 }
 
 // Grid lines over the whole pane, and a scale in its corner.
-function drawGrid(ctx, map, scale, [x0, y0, x1, y1]) {
+function drawGrid({ ctx, map, scale, taken }, [x0, y0, x1, y1]) {
   const step = scale > 14 ? 1 : scale > 4 ? 5 : 10;
   ctx.strokeStyle = theme.grid;
   ctx.lineWidth = 1;
@@ -99,6 +99,7 @@ function drawGrid(ctx, map, scale, [x0, y0, x1, y1]) {
   ctx.lineWidth = 2;
   strokeLine(ctx, [[u + 8, v - 8], [u + 8 + bar * scale, v - 8]]);
   label(ctx, `${bar} m`, u + 8 + (bar * scale) / 2, v - 13, theme.thing);
+  taken.push([u, v - 26, u + 16 + bar * scale, v]);
 }
 
 function drawScene(ctx, map, scale) {
@@ -156,11 +157,10 @@ function drawPlanHulls(plan, side) {
     if (!points.length) continue;
     roundedPath(ctx, points, Math.max((tracked ? 0.4 : BODY.footprint + 0.05) * scale, 7));
     drawRegion(ctx, colourOf(id), tracked);
-    if (!plan.options.ids) continue;
+    if (!plan.options.ids || !shownIn(plan, points)) continue;
     const mid = points.reduce((a, p) => a + p[0], 0) / points.length;
-    const edge = tracked ? Math.max(...points.map(p => p[1])) + 0.45 * scale + 15 : Math.min(...points.map(p => p[1])) - 0.35 * scale - 7;
-    label(ctx, side.letter + id, mid, edge, colourOf(id), true);
-    plan.taken.push([mid - 10, edge - 12, mid + 10, edge + 2]);
+    const vs = points.map(p => p[1]), ends = [Math.min(...vs) - 0.35 * scale - 12, Math.max(...vs) + 0.45 * scale + 10];
+    placeLabel(plan, side.letter + id, hullSpots(mid, tracked ? ends.reverse() : ends), colourOf(id), false, true);
   }
 }
 
@@ -191,7 +191,7 @@ const LABEL_DIRECTIONS = [[1, 1], [1, -1], [-1, 1], [-1, -1], [0, 1], [1, 0], [-
 function drawPersonIds(plan, shown) {
   const r = Math.max(BODY.shoulder * plan.scale, 6), here = [];
   for (const side of shown) for (const row of side.rows(plan.frame)) here.push([side, row, positionOf(plan, side, row)]);
-  const seen = here.filter(([, , at]) => !Number.isNaN(at[0]));
+  const seen = here.filter(([, , at]) => !Number.isNaN(at[0]) && shownIn(plan, [at]));
   for (const [, , [u, v]] of seen) plan.taken.push([u - r, v - r, u + r, v + r]);
   for (const [side, row, [u, v]] of seen) {
     const { tracked } = side, sign = tracked ? -1 : 1;
@@ -199,7 +199,7 @@ function drawPersonIds(plan, shown) {
       const near = p && q ? 0.75 * r : r + 1;
       return [u + sign * p * (near + half[0]), v + sign * q * (near + half[1])];
     });
-    placeLabel(plan.ctx, plan.taken, side.id[row], spots, rowColour(side, row, plan.options.by), tracked);
+    placeLabel(plan, side.id[row], spots, rowColour(side, row, plan.options.by), tracked);
   }
 }
 

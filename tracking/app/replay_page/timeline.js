@@ -10,7 +10,14 @@ const KINDS = {
   enter: { colour: 7, shape: "M0,-5 V5 M0,0 H5", word: "enter" },
   leave: { colour: 9, shape: "M0,-5 V5 M0,0 H-5", word: "leave" },
 };
-const GUTTER = 104, LANE = 15, BAR = 12;
+const LANE = 15, BAR = 12, LETTER = 7.2, LEAST = 104, MOST = 150; // px
+let gutter = LEAST; // px left of the lanes, for their headings
+
+// The px that headings need, which are a word and "groups".
+function gutterOf(words) {
+  const longest = Math.max(...words.map(word => word.length)) + " groups".length;
+  return Math.min(Math.max(Math.ceil(10 + LETTER * longest), LEAST), MOST);
+}
 
 function element(name, attributes, parent, text) {
   const node = document.createElementNS("http://www.w3.org/2000/svg", name);
@@ -39,8 +46,9 @@ function seconds(frame) {
 // Draws the timeline into `box`. Returns `move` (puts the playhead at a frame) and `frameAt` (the frame at an x in px).
 function timeline(box, width, seekTo) {
   const svg = element("svg", { role: "img", "aria-label": "Timeline of events and groups; seek with the slider or by clicking" });
-  const span = Math.max(width - GUTTER - 14, 50), last = Math.max(data.to - data.from, 1);
-  const x = frame => GUTTER + ((frame - data.from) / last) * span;
+  gutter = gutterOf(sides.map(side => side.word));
+  const span = Math.max(width - gutter - 14, 50), last = Math.max(data.to - data.from, 1);
+  const x = frame => gutter + ((frame - data.from) / last) * span;
   let y = drawAxis(svg, x, width);
   for (const [a, b] of data.unlabelled) drawUnlabelled(svg, x(a), x(b + 1));
   for (const side of sides) y = drawEvents(svg, side, x, y, seekTo);
@@ -58,13 +66,13 @@ function timeline(box, width, seekTo) {
       head.setAttribute("x2", x(frame));
       knob.setAttribute("transform", `translate(${x(frame)} 0)`);
     },
-    frameAt: px => Math.min(Math.max(Math.round(data.from + ((px - GUTTER) / span) * last), data.from), data.to),
+    frameAt: px => Math.min(Math.max(Math.round(data.from + ((px - gutter) / span) * last), data.from), data.to),
   };
 }
 
 function drawAxis(svg, x, width) {
   const first = seconds(data.from), total = seconds(data.to), steps = [0.5, 1, 2, 5, 10, 20, 30, 60, 120, 300, 600, 1800, 3600];
-  const step = steps.find(s => (total - first) / s <= Math.max((width - GUTTER) / 70, 2)) || 7200;
+  const step = steps.find(s => (total - first) / s <= Math.max((width - gutter) / 70, 2)) || 7200;
   for (let t = Math.ceil(first / step) * step; t <= total + 1e-9; t += step) {
     const u = x(1 + t * data.fps);
     element("text", { x: u, y: 10, "text-anchor": "middle", fill: theme.thing }, svg, `${t} s`);
@@ -79,9 +87,9 @@ function drawUnlabelled(svg, from, to) {
 }
 
 function drawHeading(svg, y, text) {
-  const [word, what] = text.split(/ (?=\S+$)/), most = 13 - what.length;
+  const [word, what] = text.split(/ (?=\S+$)/), most = Math.floor((gutter - 10) / LETTER) - what.length;
   const short = word.length > most ? `…${word.slice(1 - most)}` : word;
-  element("title", {}, element("text", { x: GUTTER - 10, y: y + 11, "text-anchor": "end" }, svg, `${short} ${what}`), text);
+  element("title", {}, element("text", { x: gutter - 10, y: y + 11, "text-anchor": "end" }, svg, `${short} ${what}`), text);
 }
 
 // Markers that would overlap are put in different lanes.
@@ -123,8 +131,8 @@ function drawErrors(svg, side, x, y, seekTo) {
 }
 
 function errorWords(error) {
-  const time = `${seconds(error.start).toFixed(1)}–${seconds(error.end).toFixed(1)} s`;
-  return `${time}  ${other ? `${sideOf[error.side].word}, ` : ""}${error.kind}: ${error.who} (${error.detail || error.cause})`;
+  const times = [error.start, error.end].map(frame => seconds(frame).toFixed(1));
+  return `${[...new Set(times)].join("–")} s  ${other ? `${sideOf[error.side].word}, ` : ""}${error.kind}: ${error.who} (${error.detail || error.cause})`;
 }
 
 function drawGroupBars(svg, side, x, y, seekTo) {

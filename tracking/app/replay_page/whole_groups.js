@@ -112,14 +112,9 @@ function drawWholeGroupIds(pane, side, map) {
     const spots = ([w, h]) => [
       [middle, bottom + h + 4], [middle, top - h - 4], [right + w + 4, level], [left - w - 4, level],
       [right + w, bottom + h], [left - w, bottom + h], [right + w, top - h], [left - w, top - h],
-    ].map(([x, y]) => [clampTo(x, w, pane.width), clampTo(y, h, pane.height)]);
-    placeLabel(pane.ctx, pane.taken, groupWords(side, row), spots, colourOf(side.id[row]), false, true);
+    ];
+    placeLabel(pane, groupWords(side, row), spots, colourOf(side.id[row]), false, true);
   }
-}
-
-// The coordinate nearest to x at which something of half width w lies inside 0 to width.
-function clampTo(x, w, width) {
-  return Math.min(Math.max(x, w), width - w);
 }
 
 // The key to the marks of groups; empty unless the tracker reports groups without people.

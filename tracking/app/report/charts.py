@@ -23,6 +23,7 @@ GREY = "#808890"
 LONGEST = 26  # characters of a name in a chart
 DASHES = ("solid", "dashed", "dotdash", "dotted")
 GAINS = ("HOTA", "group_F1")
+MARGIN = 0.02  # share of the range that stays free beside the first and the last mark
 TOOLS = "pan,wheel_zoom,box_zoom,reset,save"
 
 
@@ -66,8 +67,9 @@ def colour(k: int) -> str:
 
 def _curves(curves: Curves, shown: Mapping[str, Json], by: str) -> Any:
     plot = _figure(380, x_axis_label=f"{curves.axis}: {curves.about}" if curves.about else curves.axis, y_axis_label=by)
-    plot.x_range.start, plot.x_range.end = first, last = curves.values[0], curves.values[-1]
-    plot.x_range.flipped = first > last
+    first, last = curves.values[0], curves.values[-1]
+    room = MARGIN * (last - first)
+    plot.x_range.start, plot.x_range.end, plot.x_range.flipped = first - room, last + room, first > last
     items, order, short = [], np.argsort(curves.values), short_names(shown)
     for k, (name, one) in enumerate(shown.items()):
         data = {key: np.array(one[key], float) for key in ("mean", "low", "high")}
@@ -81,7 +83,9 @@ def _curves(curves: Curves, shown: Mapping[str, Json], by: str) -> Any:
             parts.append(plot.scatter([at], [height], size=15, marker="x", line_width=3, **look))
         plot.add_tools(HoverTool(renderers=[dots], tooltips=[("", name), (curves.axis, "@x"), (by, "@mean{0.000}")]))
         items.append((short[name], parts))
-    plot.add_layout(Legend(items=items, click_policy="hide", orientation="horizontal", ncols=2), "below")
+    plot.add_layout(
+        Legend(items=items, click_policy="hide", orientation="horizontal", ncols=2, location="top_left"), "below"
+    )
     return plot
 
 

@@ -66,7 +66,8 @@ function move(by) {
 function onKey(event) {
   if (event.key === "]") move(1);
   if (event.key === "[") move(-1);
-  if (event.key === "Escape") $("player").close();
+  const inKeys = event.target.ownerDocument.querySelector("#help[open]"); // Escape closes the list of keys alone
+  if (event.key === "Escape" && !inKeys) $("player").close();
 }
 
 // The replay with which the report opens: as high as its content; space and arrows reach it from the page around it.
@@ -103,10 +104,16 @@ if (items.length) {
   for (const cell of document.querySelectorAll("[data-cell]")) cell.addEventListener("click", () => {
     filter({ name: cell.dataset.name, scenario: cell.dataset.scenario, kind: "" });
     $("moments").scrollIntoView({ behavior: "smooth" });
+    buttons()[0]?.focus({ preventScroll: true });
   });
   $("before").addEventListener("click", () => move(-1));
   $("after").addEventListener("click", () => move(1));
   $("close").addEventListener("click", () => $("player").close());
   $("player").addEventListener("keydown", onKey);
-  $("player").addEventListener("close", () => { $("player").querySelector("iframe").srcdoc = ""; });
+  $("player").addEventListener("close", () => {
+    const frame = $("player").querySelector("iframe"), shown = buttons()[open];
+    frame.onload = null; // it would take the focus into the empty page
+    frame.srcdoc = "";
+    shown?.focus();
+  });
 }

@@ -47,9 +47,9 @@ class GroupPdaConfig(BackgroundSettings):
     confirm_time: float = param(0.3, (0.0, 3.0), "s",
         "a new group is confirmed after so long with measurements, removed after so long without; parts split (ours)")
     coast_time: float = param(1.5, (0.0, 10.0), "s",
-        "observed time without points after which a group is lost (ours)")
+        "observed time without points after which a group is lost; `report_coast` says how long it is reported (ours)")
     report_coast: float = param(0.5, (0.0, 5.0), "s",
-        "observed time after the last measurement for which a group is reported (ours)")
+        "observed time after the last measurement for which a group is reported, at most `coast_time` (ours)")
     carry_time: float = param(0.9, (0.0, 3.0), "s",
         "time for which a member is expected at its predicted place; from points a missed one stands in there (ours)")
     carry_reach: float = param(0.37, (0.05, 2.0), "m",

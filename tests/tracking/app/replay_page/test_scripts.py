@@ -77,6 +77,41 @@ def test_places_on_the_ground_are_where_the_camera_sees_them(radial: float) -> N
     np.testing.assert_allclose(found[seen], uv[seen], atol=0.05)
 
 
+WRITTEN = """(() => {
+    const found = [], nothing = () => {}, fillText = (text, x, y) => found.push([x, y]);
+    const ctx = { measureText: () => ({ width: 38 }), strokeText: nothing, setLineDash: nothing, fillText };
+    const pane = { ctx, width: 100, height: 80, taken: [[0, 0, 50, 20]] };
+    placeLabel(pane, "a", () => [[-5, 40]], "red");
+    placeLabel(pane, "b", () => [[99, 79]], "red");
+    placeLabel(pane, "c", () => [[25, 10], [75, 10]], "red");
+    return [found, pane.taken.length, [[-4, 5], [-4, -1]].map(([a, b]) => shownIn(pane, [[a, 3], [b, 4]]))];
+})()"""
+
+
+def test_labels_stay_in_their_pane_and_off_its_title() -> None:
+    """Half as wide as 20 px, half as high as 6 px; what lies outside of the pane has no label."""
+    places, taken, inside = ran(EMPTY, ("decode.js", "draw.js"), WRITTEN)
+    assert places == [[20, 44], [80, 78], [75, 14]]
+    assert taken == 4
+    assert inside == [True, False]
+
+
+def test_headings_of_the_timeline_get_the_room_that_they_need() -> None:
+    """At least 104 px, at most 150."""
+    what = "[['truth', 'blob'], ['truth', 'group-pda'], ['a_tracker_with_a_long_name']].map(words => gutterOf(words))"
+    assert ran(EMPTY, ("decode.js", "draw.js", "timeline.js"), what) == [104, 126, 150]
+
+
+def test_an_error_within_a_tenth_of_a_second_has_one_time() -> None:
+    errors = [
+        {"side": "tracks", "kind": "ghost", "who": "track 3", "cause": "tracker", "start": 1, "end": b} for b in (1, 40)
+    ]
+    words = ran(
+        EMPTY | {"fps": 10, "errors": errors}, ("decode.js", "draw.js", "timeline.js"), "data.errors.map(errorWords)"
+    )
+    assert [text.split("  ")[0] for text in words] == ["0.0 s", "0.0–3.9 s"]
+
+
 def test_errors_are_named_for_a_second_the_latest_two() -> None:
     spans = {"a": (1, 40), "b": (10, 10), "c": (12, 30), "d": (31, 33)}
     errors = [{"side": "tracks", "kind": kind, "start": a, "end": b} for kind, (a, b) in spans.items()]

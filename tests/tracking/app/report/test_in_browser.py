@@ -15,6 +15,9 @@ from tracking.app.report.page import report_html
 pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")]
 
 CLOCK = "document.querySelector('iframe').contentDocument?.getElementById('clock')?.value"
+BUTTONS = """[...document.querySelectorAll('#list li')].filter(item => !item.hidden)
+    .map(item => item.querySelector('button').dataset.moment)"""
+HELP = "document.querySelector('iframe').contentDocument.getElementById('help')"
 CHOOSE = """{ const select = document.querySelector('select[data-field=name]');
     select.value = 'Bad'; select.dispatchEvent(new Event('change')) }"""
 INK = "[...Bokeh.documents[0]._all_models.values()].find(m => m.type === 'LinearAxis').major_label_text_color"
@@ -64,6 +67,8 @@ def test_open_filter_replay(page: Page) -> None:
     assert set(page.value(SHOWN)) == {"Bad"}
     page.value("[...document.querySelectorAll('#list li')].find(item => !item.hidden).querySelector('button').click()")
     page.wait(CLOCK)
+    heading = page.value("document.querySelector('iframe').contentDocument.querySelector('h1').textContent")
+    assert heading.startswith("merge-s0000")
     first = page.value(CLOCK)
     page.press("x")
     page.wait(f"{CLOCK} !== {first!r}")
@@ -72,10 +77,17 @@ def test_open_filter_replay(page: Page) -> None:
     page.wait(f"{CLOCK} !== {error!r}")
     panes = "document.querySelector('iframe').contentDocument.getElementById('stages').classList.contains('beside')"
     assert page.value(panes), "two trackers side by side"
+    page.press("?")
+    page.wait(f"{HELP}.open")
+    page.press("Escape")
+    page.wait(f"!{HELP}.open")
+    assert page.value("document.getElementById('player').open"), "Escape closes the list of keys alone"
     page.press("]")
     page.wait(f"{CLOCK} && document.getElementById('which').textContent.startsWith('Bad')")
+    second = page.value(BUTTONS)[1]
     page.press("Escape")
     page.wait("!document.getElementById('player').open")
+    page.wait(f"document.activeElement.dataset.moment === {second!r}")
     assert page.messages == []
 
 

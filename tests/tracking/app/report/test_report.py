@@ -13,6 +13,17 @@ from tracking.app.report import content, moments
 from tracking.app.report.moments import chosen
 from tracking.app.report.page import report_html
 
+
+def curve_ranges() -> set[tuple[float, float]]:
+    """The ends of the horizontal axes of the curves."""
+    page = report_html(full("blob"))
+    charts = json.loads(re.findall(r'id="charts">(.*?)</script>', page, re.DOTALL)[0])
+    found = [
+        charts[id]["doc"]["roots"][0]["attributes"]["x_range"]["attributes"] for id in ("chart-shares", "chart-curves")
+    ]
+    return {(one["start"], one["end"]) for one in found}
+
+
 EVIL = "<img src=x onerror=alert(1)></script><script>alert(2)</script>"
 EMPTY = content.Report("Two trackers", "about", "HOTA", [])
 
@@ -26,6 +37,14 @@ def test_all_parts_stand_in_the_page() -> None:
     assert all(f'id="{id}"' in page for id in charts)
     assert "no scene, blob" in page, "an empty cell says why"
     assert page.count("56 %<small>0.500") == 2, "means, as a share of the oracle's 0.9"
+    assert '<i class="unseen">blob on blob: </i>56 %' in page
+    assert page.count('role="figure" aria-label="') == len(charts)
+
+
+def test_curves_leave_room_for_their_last_marks() -> None:
+    """2 % at both ends, the easy end on the left."""
+    (made,) = curve_ranges()
+    assert made == pytest.approx((1.012, 0.388))
 
 
 def test_parts_without_content_are_left_out() -> None:
