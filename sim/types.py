@@ -251,7 +251,8 @@ class Motion(Frozen):
     (T, P): rad; nan while absent. present (T, P): True while in the scene. intent (T, P): number of the group that the
     script assigns the person to (a number of its own for a person alone, -1 while absent). height, width, depth (P,):
     of the body, m. free_speed (P,): walking speed alone, m/s. orders: of the script. measured: states from which the
-    truth is measured; None: the frames themselves. never_arrive: groups that do not reach their goal."""
+    truth is measured; None: the frames themselves. never_arrive: groups that do not reach their goal. unfired: id of
+    each order that never fired, and the reason in words."""
 
     name: str
     seed: int
@@ -270,6 +271,7 @@ class Motion(Frozen):
     orders: tuple[Order, ...] = ()
     measured: States | None = None
     never_arrive: tuple[NeverArrives, ...] = ()
+    unfired: tuple[tuple[str, str], ...] = ()
 
     def states(self) -> States:
         """Returns the states from which the truth is measured."""

@@ -21,8 +21,7 @@ from sim.crowd.population import ScriptPlacement, draw_point
 from sim.elementary import length, unit
 from sim.rng import draw, rng
 from sim.truth.merge_split_rules import Separation, separation
-from sim.truth.order_fulfilment import RULE_TIME
-from sim.truth.queue_detection import QUEUE_PEOPLE
+from sim.truth.order_fulfilment import PATIENCE, RULE_TIME, WALKING_SPEED, queued
 from sim.types import Array, Order
 
 JOIN_RADIUS = 0.5  # m from the first free place: a group has joined
@@ -91,7 +90,6 @@ class ServiceQueue:
         return [self.joined.pop(0)]
 
 
-IN_PLACE = 0.4  # m from the own place in a queue
 EPS = 1e-9  # s
 
 
@@ -111,6 +109,10 @@ class PendingOrder:
     true_at: float | None = None  # time at which it had held long enough, s; None: not yet
     # s for which the order's rule (people are together, apart or in line, as ordered) has held without a break
     held_for: float = 0.0
+    # of a queue: states (P, 4) of everybody at each tick since the order fired, and time in s from then on to examine
+    seen: list[Array] = field(default_factory=list)
+    patience: float = PATIENCE
+    nearest: float = np.inf  # m: least distance so far of which the trigger asks for a smaller one
     # before, after: columns (person id - 1) of the people of each group before and after the order; empty until it
     # fires. Times count from the first recorded frame.
     before: tuple[tuple[int, ...], ...] = ()
@@ -137,21 +139,43 @@ class PendingOrder:
             return when.after in come_true
         if when.distance_lt is not None:
             gaps = _separations(state, [groups.members[groups.alive[n]] for n in names])
-            return bool(gaps) and bool(max(gap.distance[0] for gap in gaps) < when.distance_lt)
+            gap = max((float(gap.distance[0]) for gap in gaps), default=np.inf)
+            self.nearest = min(self.nearest, gap)
+            return gap < when.distance_lt
         assert when.reach is not None
         g = groups.alive.get(when.reach.group)
         if g is None or not groups.all_present(g):
             return False
         at = groups.goals[g][0] if self.reach_at is None else self.reach_at
         middle = state[groups.members[g], :2].mean(axis=0)
-        return bool(length(middle - at) < when.reach.radius)
+        gap = float(length(middle - at))
+        self.nearest = min(self.nearest, gap)
+        return gap < when.reach.radius
 
-    def watch(self, t: float, holds: bool) -> None:
-        """Updates `held_for` at a tick of time t (s). holds: whether the order's rule holds at this tick.
+    def obstacle(self, groups: GroupState) -> str:
+        """Returns in words, at the end of the recording, why the order has not fired."""
+        when, names = self.order.when, concerned(self.order, list(groups.alive))
+        absent = [n for n in names if n not in groups.alive or not groups.all_present(groups.alive[n])]
+        if absent or not names:
+            return f"at the end, {', '.join(absent) or 'all groups'} were not in the scene"
+        if self.met_at is not None:
+            return f"its trigger was met at {self.met_at:g} s, and `delay` is {self.delay:.1f} s"
+        if when.after is not None:
+            return f"{when.after} had not come true"
+        return f"its groups came within {self.nearest:.2f} m" if np.isfinite(self.nearest) else ""
 
-        Sets `true_at` to t if the rule has held without a break for the time that this kind of order requires.
+    def watch(self, t: float, state: Array) -> None:
+        """Sets `true_at` to t (s) if the order's rule has held by now for the time that its kind requires.
+
+        state (P, 4): x, y, vx, vy by column, nan while absent. A queue is measured as the truth measures it.
         """
-        self.held_for = self.held_for + 1 / SCRIPT_RATE if holds else 0.0
+        if isinstance(self.order, QueueOrder):
+            if len(self.seen) <= self.patience * SCRIPT_RATE:
+                self.seen.append(state.copy())
+                done = queued({c + 1 for c in self.after[0]}, np.array(self.seen), SCRIPT_RATE)
+                self.true_at = t if done else None
+            return
+        self.held_for = self.held_for + 1 / SCRIPT_RATE if rule_holds(self, state) else 0.0
         if self.held_for >= RULE_TIME[self.order.type] - EPS:
             self.true_at = t
 
@@ -166,16 +190,12 @@ def concerned(order: MergeOrder | SplitOrder | QueueOrder, alive: list[str]) -> 
     return list(dict.fromkeys(n for pattern in order.groups for n in expand(pattern, alive)))
 
 
-def rule_holds(pending: PendingOrder, state: Array, targets: Array) -> bool:
-    """Returns True if the rule of an order that has fired holds at this tick.
+def rule_holds(pending: PendingOrder, state: Array) -> bool:
+    """Returns True if the rule of a merge or split that has fired holds at this tick.
 
-    state (P, 4): x, y, vx, vy by column, nan while absent. targets (P, 2): places in the queue by column, m.
+    state (P, 4): x, y, vx, vy by column, nan while absent.
     """
     order = pending.order
-    if isinstance(order, QueueOrder):
-        columns = list(pending.after[0])
-        off = length(state[columns, :2] - targets[columns])
-        return bool(np.sum(off < IN_PLACE) >= min(QUEUE_PEOPLE, len(columns)))
     parts = [list(p) for p in (pending.before if isinstance(order, MergeOrder) else pending.after)]
     if not all(np.isfinite(state[p]).all() for p in parts):
         return False
@@ -200,8 +220,8 @@ def groups_made(scenario: Scenario) -> int:
 class OrderExecution:
     """Carries out the orders of one scenario on the groups of a running simulation.
 
-    State: pending: all orders, fired or not; come_true: ids of orders whose rule has held long enough; queues: the
-    opened ones, by index of their order in the file.
+    State: pending: all orders, fired or not; come_true: ids of orders whose rule has held long enough; awaited: ids of
+    orders that others wait for (`after`); queues: the opened ones, by index of their order in the file.
     """
 
     def __init__(
@@ -210,6 +230,7 @@ class OrderExecution:
         self.groups, self.placement, self.seed, self.repeat = groups, placement, seed, repeat
         self.queues: dict[int, ServiceQueue] = {}
         self.come_true: set[str] = set()
+        self.awaited = {order.when.after for order in scenario.event}
         self.pending = [self._pending(order, k) for k, order in enumerate(scenario.event)]
 
     def _rng(self, role: str, *keys: int) -> np.random.Generator:
@@ -236,9 +257,9 @@ class OrderExecution:
                 elif isinstance(pending.order, SplitOrder):
                     self._split(pending, pending.order, state)
                 else:
-                    self._line_up(pending, pending.order)
-            elif pending.fired is not None and pending.true_at is None:
-                pending.watch(t, rule_holds(pending, state, self.groups.targets))
+                    self._line_up(pending, pending.order, state)
+            elif pending.fired is not None and pending.true_at is None and pending.order.id in self.awaited:
+                pending.watch(t, state)
                 if pending.true_at is not None:
                     self.come_true.add(pending.order.id)
         for queue in self.queues.values():
@@ -302,7 +323,7 @@ class OrderExecution:
             groups.arrays.heading[g] = groups.arrays.heading[parent]
         pending.after = tuple(after)
 
-    def _line_up(self, pending: PendingOrder, order: QueueOrder) -> None:
+    def _line_up(self, pending: PendingOrder, order: QueueOrder, state: Array) -> None:
         groups = self.groups
         queuing = [groups.alive[n] for n in concerned(order, list(groups.alive))]
         for queue in self.queues.values():
@@ -315,6 +336,7 @@ class OrderExecution:
         self.queues[pending.index] = ServiceQueue(head, along, order.spacing, service, coming=list(queuing))
         columns = [c for g in queuing for c in groups.members[g]]
         groups.queue_of[columns] = pending.index
+        pending.patience += float(np.mean(length(state[columns, :2] - head))) / WALKING_SPEED
         pending.before = tuple(tuple(groups.members[g]) for g in queuing)
         pending.after = (tuple(sorted(columns)),)
         if order.goal is not None:
@@ -333,6 +355,10 @@ class OrderExecution:
             groups.go(g, state[columns, :2].mean(axis=0), [], goal, finish, groups.walking_speed(columns))
             groups.settled.discard(g)
             groups.places[columns] = walking(len(columns), groups.spacing[g])
+
+    def unfired(self) -> tuple[tuple[str, str], ...]:
+        """Returns the id of each order that has not fired, and why, in words."""
+        return tuple((p.order.id, p.obstacle(self.groups)) for p in self.pending if p.fired is None)
 
     def record(self, frames: FrameTimes) -> tuple[Order, ...]:
         """Returns all orders of the script with the frame (from 1) of firing, and the people before and after."""

@@ -248,7 +248,7 @@ class World:
             pos=state[..., :2], vel=state[..., 2:], heading=heading, present=there, intent=intent, height=height,
             width=SHOULDER_SHARE * height, depth=DEPTH_SHARE * height,
             free_speed=np.array([m.free_speed for m in self.members]), scene=self.scene,
-            orders=self.orders.record(frames), measured=measured,
+            orders=self.orders.record(frames), measured=measured, unfired=self.orders.unfired(),
         )  # fmt: skip
 
 
