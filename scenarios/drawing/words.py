@@ -104,8 +104,10 @@ def order(event: ScriptOrder) -> str:
     if isinstance(event, SplitOrder):
         parts = [f"{p.id} ({p.size or 'rest'}) to {place(p.goal)}" for p in event.parts]
         return f"split {event.group} → {', '.join(parts)}"
+    where = "" if event.counters is None else f" at the next free of {', '.join(map(place, event.counters))}"
     served = "" if event.goal is None else f", then to {place(event.goal)}"
-    return f"queue {', '.join(event.groups)} at {place(event.at)}, served {number(event.service, 's')} each{served}"
+    lined = f"queue {', '.join(event.groups)} at {place(event.at)}"
+    return f"{lined}, served {number(event.service, 's')} each{where}{served}"
 
 
 def sensor(scenario: Scenario) -> list[str]:

@@ -401,13 +401,15 @@ class SplitOrder(Model):
 
 
 class QueueOrder(Model):
-    """An order: groups line up, are served one group after the other, and walk on.
+    """An order: groups line up, are served one group after the other or at several counters, and walk on.
 
     Attributes:
         id: name of the order
         type: groups line up and are served one by one
         groups: names of the groups that line up; `g-*` stands for all groups whose name begins with `g-`
         at: place of the first person in the queue, m
+        counters: service points, m: whoever is first in the queue walks to the nearest free one and is served there;
+            absent: people are served at the head of the queue
         direction_deg: direction from the head to the tail of the queue; 0 = +x, 90 = +y
         spacing: distance between neighbours in the queue, m
         service: time for which each group is served, s
@@ -419,6 +421,7 @@ class QueueOrder(Model):
     type: Literal["queue"]
     groups: Annotated[tuple[Pattern, ...], Field(min_length=1)]
     at: FixedPoint
+    counters: Annotated[tuple[FixedPoint, ...], Field(min_length=1)] | None = None
     direction_deg: float = 0.0
     spacing: Annotated[float, Field(ge=0.5, le=1.4)] = 0.8
     service: Seconds = Distribution(exponential=3.0)

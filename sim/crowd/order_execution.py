@@ -33,6 +33,7 @@ class ServiceQueue:
     """One queue at a service point. Groups are given by index; a group is served as a whole."""
 
     head: Array
+    counters: Array  # (K, 2) m: where people are served; K = 0: at the head
     along: Array  # (2,) unit vector from head to tail
     spacing: float  # between neighbouring places, m
     # service time in s of each group, by group index. State: joined: groups in the queue, head first.
@@ -41,10 +42,16 @@ class ServiceQueue:
     coming: list[int] = field(default_factory=list)  # groups on their way to it
     # time at which the group at the head is done, s; None while no group is being served
     busy_until: float | None = None
+    # by number of the counter: the group there or on its way there, and the time at which the group there is done, s
+    called: dict[int, int] = field(default_factory=dict)
+    until: dict[int, float] = field(default_factory=dict)
 
     def slot(self, k: int) -> Array:
         """Returns the place (2,) m of the k-th person in the queue; k = 0 is the head."""
-        return self.head + k * self.spacing * self.along
+        return self._behind(self.head, k)
+
+    def _behind(self, first: Array, k: int) -> Array:
+        return first + k * self.spacing * self.along
 
     def remove(self, g: int) -> None:
         """Takes group g out of the queue if the group is in it. If it is being served, its service is broken off."""
@@ -52,15 +59,18 @@ class ServiceQueue:
             self.busy_until = None
         self.joined = [other for other in self.joined if other != g]
         self.coming = [other for other in self.coming if other != g]
+        for k in [k for k, other in self.called.items() if other == g]:
+            del self.called[k]
+            self.until.pop(k, None)
 
     def advance(self, t: float, members: dict[int, list[int]], pos: Array) -> tuple[dict[int, Array], list[int]]:
         """Advances the queue to time t (s): ends and begins service, and lets groups join at the tail.
 
-        Returns the place (2,) m of each person by column, and a list with the index of the group whose service has
-        ended now, or an empty list. members: columns of each group, by group index; for a group that is still coming
+        Returns the place (2,) m of each person by column, and the indices of the groups whose service has ended now.
+        members: columns of each group, by group index; for a group that is still coming
         this list is sorted in place, nearest to the head first. pos (P, 2): m, by column.
         """
-        done = self._serve(t, members, pos)
+        done = self._serve_at_counters(t, members, pos) if len(self.counters) else self._serve(t, members, pos)
 
         def far(g: int, tail: int) -> float:
             return float(np.min(length(pos[members[g]] - self.slot(tail))))
@@ -73,7 +83,25 @@ class ServiceQueue:
         for g in self.coming:
             members[g].sort(key=lambda c: (float(length(pos[c] - self.head)), c))
         line = [column for g in self.joined + self.coming for column in members[g]]
-        return {column: self.slot(k) for k, column in enumerate(line)}, done
+        places = {column: self.slot(k) for k, column in enumerate(line)}
+        for k, g in self.called.items():
+            places |= {column: self._behind(self.counters[k], n) for n, column in enumerate(members[g])}
+        return places, done
+
+    def _serve_at_counters(self, t: float, members: dict[int, list[int]], pos: Array) -> list[int]:
+        """Returns the groups whose service ends by time t; calls the first group of the queue to a free counter."""
+        done = []
+        for k, g in list(self.called.items()):
+            if k not in self.until and length(pos[members[g][0]] - self.counters[k]) < SERVED_RADIUS:
+                self.until[k] = t + self.service[g]
+            elif t >= self.until.get(k, np.inf):
+                del self.until[k]
+                done.append(self.called.pop(k))
+        free = [k for k in range(len(self.counters)) if k not in self.called]
+        if free and self.joined and length(pos[members[self.joined[0]][0]] - self.head) < SERVED_RADIUS:
+            nearest = min(free, key=lambda k: float(length(self.counters[k] - self.head)))
+            self.called[nearest] = self.joined.pop(0)
+        return done
 
     def _serve(self, t: float, members: dict[int, list[int]], pos: Array) -> list[int]:
         """Returns the group whose service ends by time t, in a list; begins the service of the next."""
@@ -333,7 +361,8 @@ class OrderExecution:
         service = {g: draw(order.service, r) for g in queuing}
         along = self.placement.vector(unit(order.direction_deg / 180 * np.pi))
         head = self.placement.point(np.array(order.at))
-        self.queues[pending.index] = ServiceQueue(head, along, order.spacing, service, coming=list(queuing))
+        counters = np.array([self.placement.point(np.array(at)) for at in order.counters or ()]).reshape(-1, 2)
+        self.queues[pending.index] = ServiceQueue(head, counters, along, order.spacing, service, coming=list(queuing))
         columns = [c for g in queuing for c in groups.members[g]]
         groups.queue_of[columns] = pending.index
         pending.patience += float(np.mean(length(state[columns, :2] - head))) / WALKING_SPEED

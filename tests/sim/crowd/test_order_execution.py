@@ -105,6 +105,50 @@ def test_the_reason_is_given_for_an_order_that_never_fires(tmp_path, when, reaso
     assert re.fullmatch(reason, words)
 
 
+COUNTERS = (
+    '{ id = "l", type = "queue", groups = ["q-*"], at = [21, 6], direction_deg = 180, counters = [[24, 4], [24, 8]], '
+    'service = 4.0, goal = [29, 6], at_goal = "leave", when = { time = 1 } }'
+)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_first_of_one_line_goes_to_the_next_free_counter(tmp_path, seed):
+    """Everybody is served once, at one of both counters, alone, for the time of service, in the order of the line."""
+    scenario(tmp_path, COUNTERS)
+    made = load(
+        tmp_path / "scene.toml", ["group.q.repeat=6", "group.q.start=[{ uniform = [12, 18] }, 6]", "duration=45"]
+    )
+    motion = run(made, seed)
+    served = []
+    for at in made.event[0].counters:
+        there = np.linalg.norm(motion.pos - np.array(at), axis=2) < 0.35
+        assert there.sum(axis=1).max() == 1
+        served += [
+            (int(np.flatnonzero(there[:, p])[0]), p) for p in range(4, 10) if there[:, p].sum() > 3.5 * motion.fps
+        ]
+    assert sorted(p for _, p in served) == [4, 5, 6, 7, 8, 9], "groups a and b, of two people each, do not queue"
+    at_head = np.linalg.norm(motion.pos - [21, 6], axis=2) < 0.35
+    line = sorted(range(4, 10), key=lambda p: int(np.flatnonzero(at_head[:, p])[0]))
+    assert [p for _, p in sorted(served)] == line
+    assert not motion.present[-1, 4:].any(), "all leave after service"
+    order = observe(made, motion).truth.orders[0]
+    assert order.event is not None, "the waiting line is measured as a queue"
+
+
+def test_a_group_that_merges_leaves_its_counter(tmp_path):
+    merge = '{ id = "m", type = "merge", groups = ["a", "q-1"], into = "aq", goal = [3, 10], when = { time = 12 } }'
+    scenario(tmp_path, COUNTERS, merge)
+    made = load(
+        tmp_path / "scene.toml", ["group.q.start=[{ uniform = [18, 20] }, 6]", "event.l.service=60", "duration=40"]
+    )
+    world = World(made, 0, 0)
+    *_, last = (state.copy() for state, _ in world.ticks(400))
+    (queue,) = world.orders.queues.values()
+    served = {world.groups.members[g][0] for g in queue.called.values()}
+    assert served == {5, 6}, "the third one has taken the free place"
+    assert np.linalg.norm(last[[0, 1, 4], :2] - [3, 10], axis=1).max() < 3.5
+
+
 def test_a_merge_as_a_parent_arrives_keeps_the_places_of_the_new_group(tmp_path):
     """Whatever the tick at which it fires, also the one in which the old group begins to stand in a circle."""
     merge = '{{ id = "m", type = "merge", groups = ["a", "b"], into = "ab", when = {{ time = {} }} }}'
