@@ -70,6 +70,9 @@ def people(group: GroupSpec) -> str:
     words.append(f"to {place(group.goal)}")
     text = " ".join(words)
     text += f", at {number(group.speed, 'm/s')}" if group.speed is not None else ""
+    text += f", {number(group.height, 'm')} tall" if group.height is not None else ""
+    worn = [" or ".join(colours) for colours in (group.clothes, group.trousers) if colours is not None]
+    text += f", dressed in {' and '.join(worn)}" if worn else ""
     text += f", scattered by {number(group.scatter, 'm')}" if group.scatter != 0.0 else ""
     text += f", entering at {number(group.enter, 's')}" if group.enter != 0.0 else ""
     return f"{text}; then they {AT_GOAL[group.at_goal]}"

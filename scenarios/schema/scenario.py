@@ -8,9 +8,10 @@ ends in Spec. Where a value may be a number or a distribution (scenarios.schema.
 from __future__ import annotations
 
 import math
+import re
 from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from scenarios.limits import FRAME_RATES, PEOPLE, PICTURE_SIZES, fits_picture
 from scenarios.schema.sensor import Sensor
@@ -110,6 +111,7 @@ FASTEST = 10.0  # m/s: as fast as a sprinter
 Speed = Annotated[Value, within(0.05, FASTEST, " m/s")]
 Seconds = Annotated[Value, within(0.0, 3600.0, " s")]  # of standing or being served
 Noise = Annotated[float, within(0.0, 1.0, " m/s")]
+Height = Annotated[Value, within(0.3, 3.0, " m")]
 Stray = Annotated[float, within(0.0, 2.0, " m")]
 Length = Annotated[float, within(0.1, 10_000.0, " m")]
 AtGoal = Literal["stand", "leave", "walk"]
@@ -232,7 +234,7 @@ class CrowdSpec(Model):
 
     free_speed: Speed = FREE_SPEED
     spacing: Annotated[Value, within(0.1, 10.0, " m")] = SPACING
-    height: Annotated[Value, within(0.3, 3.0, " m")] = HEIGHT
+    height: Height = HEIGHT
     slowdown_per_member: Annotated[float, within(0.0, FASTEST, " m/s")] = 0.05
     sway: Annotated[Value, within(0.0, 0.2, " m")] = SWAY
     velocity_noise: tuple[Noise, Noise] = (0.08, 0.13)
@@ -264,6 +266,33 @@ def _somebody(size: Value) -> Value:
     return size
 
 
+COLOURS = {
+    "black": 0x1A1A1C, "white": 0xE6E6E6, "grey": 0x808080, "red": 0xC02020, "orange": 0xE07818, "yellow": 0xE8C820,
+    "green": 0x208038, "blue": 0x2050B8, "navy": 0x1C2848, "purple": 0x703090, "pink": 0xE080A8, "brown": 0x70482C,
+    "beige": 0xC8B898,
+}  # fmt: skip
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Returns red, green and blue, 0 to 255, of a colour's name or "#rrggbb"."""
+    number = COLOURS.get(colour)
+    number = int(colour[1:], 16) if number is None else number
+    return number >> 16, number >> 8 & 255, number & 255
+
+
+def _colour(word: str) -> str:
+    if word not in COLOURS and not re.fullmatch("#[0-9a-fA-F]{6}", word):
+        raise problem(repr(word), f"a colour: {', '.join(COLOURS)}, or '#rrggbb'", "correct it")
+    return word
+
+
+Colours = Annotated[
+    tuple[Annotated[str, AfterValidator(_colour)], ...],
+    Field(min_length=1),
+    BeforeValidator(lambda value: (value,) if isinstance(value, str) else value),
+]
+
+
 class GroupSpec(Model):
     """A group of people who belong together from the start; a person alone is a group of one.
 
@@ -277,6 +306,9 @@ class GroupSpec(Model):
         scatter: distance of each member from its place in the group when the group enters, m; drawn for each member, in
             any direction
         speed: speed of the whole group, m/s; absent: follows from its members' speeds
+        height: body height of each member, m; absent: crowd.height
+        clothes: colour of the upper garment, or several, one of which is drawn for each member; absent: any
+        trousers: colour of the trousers, likewise
         enter: time of entry, s; 0 = present from the first frame; negative = during the warm-up
         at_goal: at the goal: stand = stay in conversation, leave = leave the scene, walk = walk straight on
         repeat: number of such groups; each is drawn independently
@@ -290,6 +322,9 @@ class GroupSpec(Model):
     via: tuple[Point, ...] = ()
     scatter: Annotated[Value, within(0.0, 10.0, " m")] = 0.0
     speed: Speed | None = None
+    height: Height | None = None
+    clothes: Colours | None = None
+    trousers: Colours | None = None
     enter: Value = 0.0
     at_goal: AtGoal = "stand"
     repeat: Annotated[int, Field(ge=1, le=5000)] = 1

@@ -249,6 +249,7 @@ class World:
             width=SHOULDER_SHARE * height, depth=DEPTH_SHARE * height,
             free_speed=np.array([m.free_speed for m in self.members]), scene=self.scene,
             orders=self.orders.record(frames), measured=measured, unfired=self.orders.unfired(),
+            clothes=np.array([m.clothes for m in self.members]),
         )  # fmt: skip
 
 
