@@ -133,7 +133,10 @@ def text(scenario: Scenario) -> str:
     lines += ["", "Orders"] + ([] if scenario.event else ["  none"])
     for k, event in enumerate(scenario.event):
         lines += [f"  {k + 1} {event.id}  {order(event)}", f"      {trigger(event.when)}"]
-    return "\n".join([*lines, "", "Sensor", *("  " + line for line in sensor(scenario)), ""])
+    draws = {f"draw.{name}": value.model_dump(exclude_none=True) for name, value in (scenario.draw or {}).items()}
+    lines += ["", "Sensor", *("  " + line for line in sensor(scenario))]
+    rows = [f"  {key} = {toml_value(value)}" for key, value in (draws | (scenario.draws or {})).items()]
+    return "\n".join([*lines, *(["", "Drawn for each seed (above: one example)"] if rows else []), *rows, ""])
 
 
 def cut(words: str, length: int) -> str:

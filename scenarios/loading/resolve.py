@@ -24,6 +24,7 @@ from scenarios.errors import InputError
 from scenarios.limits import REPEATS
 from scenarios.loading import toml_files
 from scenarios.loading.checks import check
+from scenarios.loading.draws import check_draws, take_out
 from scenarios.loading.toml_files import CATALOGUE, SUITES, Setting, did_you_mean, dump, names, suite_names
 from scenarios.loading.validation import validate
 from scenarios.schema.scenario import ObservationSpec, Scenario
@@ -209,6 +210,10 @@ def _entries(path: Path, settings: tuple[str | Setting, ...]) -> list[Entry]:
 
 def _build(path: Path, settings: tuple[str | Setting, ...]) -> Scenario:
     table, places = toml_files.apply_settings(toml_files.read(path), settings, path)
+    table, draws = take_out(table, path, places)
     scenario = validate(table, path, places, model=Scenario)
     check(scenario, path)
+    if draws:
+        scenario = scenario.model_copy(update={"draws": draws})
+        check_draws(scenario, path)
     return scenario

@@ -8,12 +8,13 @@ ends in Spec. Where a value may be a number or a distribution (scenarios.schema.
 from __future__ import annotations
 
 import math
-import re
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic.json_schema import SkipJsonSchema
 
 from scenarios.limits import FRAME_RATES, PEOPLE, PICTURE_SIZES, fits_picture
+from scenarios.schema.colours import Colours
 from scenarios.schema.sensor import Sensor
 
 # isort: off
@@ -266,33 +267,6 @@ def _somebody(size: Value) -> Value:
     return size
 
 
-COLOURS = {
-    "black": 0x1A1A1C, "white": 0xE6E6E6, "grey": 0x808080, "red": 0xC02020, "orange": 0xE07818, "yellow": 0xE8C820,
-    "green": 0x208038, "blue": 0x2050B8, "navy": 0x1C2848, "purple": 0x703090, "pink": 0xE080A8, "brown": 0x70482C,
-    "beige": 0xC8B898,
-}  # fmt: skip
-
-
-def rgb(colour: str) -> tuple[int, int, int]:
-    """Returns red, green and blue, 0 to 255, of a colour's name or "#rrggbb"."""
-    number = COLOURS.get(colour)
-    number = int(colour[1:], 16) if number is None else number
-    return number >> 16, number >> 8 & 255, number & 255
-
-
-def _colour(word: str) -> str:
-    if word not in COLOURS and not re.fullmatch("#[0-9a-fA-F]{6}", word):
-        raise problem(repr(word), f"a colour: {', '.join(COLOURS)}, or '#rrggbb'", "correct it")
-    return word
-
-
-Colours = Annotated[
-    tuple[Annotated[str, AfterValidator(_colour)], ...],
-    Field(min_length=1),
-    BeforeValidator(lambda value: (value,) if isinstance(value, str) else value),
-]
-
-
 class GroupSpec(Model):
     """A group of people who belong together from the start; a person alone is a group of one.
 
@@ -481,6 +455,7 @@ class Scenario(Model):
         lead: time by which all walking groups start further on along their way (negative: further back), s; one draw
             for all
         mirror: true: with probability 0.5 the script is mirrored left to right
+        draw: named numbers that are drawn once for each seed, for the links of several keys; each is a distribution
     """
 
     schema_: Literal[1] = Field(alias="schema")
@@ -499,6 +474,9 @@ class Scenario(Model):
     crowd: CrowdSpec = CrowdSpec()
     group: Annotated[tuple[GroupSpec, ...], Field(min_length=1)]
     event: tuple[ScriptOrder, ...] = ()
+    draw: dict[Name, Distribution] | None = None
+    # Not a key of files: the distributions and links in places of fixed values, by key.
+    draws: SkipJsonSchema[dict[str, dict[str, Any]] | None] = None
 
 
 def group_names(group: GroupSpec) -> list[str]:

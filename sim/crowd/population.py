@@ -15,7 +15,8 @@ from functools import cached_property
 import numpy as np
 
 from scenarios.errors import InputError, counted
-from scenarios.schema.scenario import CrowdSpec, GroupSpec, Scenario, Stop, group_names, rgb
+from scenarios.schema.colours import rgb
+from scenarios.schema.scenario import CrowdSpec, GroupSpec, Scenario, Stop, group_names
 from scenarios.schema.values import Distribution, Point, Value
 from sim.crowd.formation import to_world, walking
 from sim.crowd.navigation import wall_distances

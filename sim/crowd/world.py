@@ -31,6 +31,7 @@ from sim.crowd.order_execution import OrderExecution, groups_made
 from sim.crowd.population import BODY_RADIUS, EnteringGroup, draw_population, fluctuations, script_placement
 from sim.crowd.stops import Stops
 from sim.crowd.wayfinding import Wayfinding
+from sim.draws import drawn
 from sim.elementary import cos, length, sin
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
 from sim.scene.terrain import flight_rows
@@ -46,7 +47,7 @@ WRITE = pymunk.batch.BodyFields.FORCE
 
 def run(scenario: Scenario, seed: int, repeat: int = 0) -> Motion:
     """Returns the whole motion of a scenario for a seed, without the warm-up."""
-    return World(scenario, seed, repeat).run()
+    return World(drawn(scenario, seed, repeat), seed, repeat).run()
 
 
 class World:
