@@ -213,7 +213,10 @@ def generate(
     folder = root / f"flockscope-{split}"
     settings, wanted = tuple(set), check_streams(streams, images)
     found = [e for entry in entries for e in (resolve(entry, settings) if isinstance(entry, str) else [entry])]
-    output_paths(folder, [entry.name for entry in found], source="entries")
+    try:
+        output_paths(folder, [entry.name for entry in found], source="entries")
+    except InputError as error:
+        raise error.replaced(remedy='combine them in a suite: entry = [{ suite = "NAME" }, …], see the docs') from None
     jobs = []
     for entry, seed in product(found, seeds):
         one = replace(entry, scenario=drawn(entry.scenario, seed, entry.repeat))
