@@ -21,7 +21,7 @@ from sim.truth.merge_split_rules import (
     HOLD_TIME, MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_DISTANCE, SPLIT_VELOCITY, longest_time, separation,
 )
 from sim.truth.queue_detection import (
-    MAX_SPACING, MIN_SPACING, QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED, longest_line, queues,
+    ADVANCE_TIME, MAX_SPACING, MIN_SPACING, QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED, longest_line, queues,
 )
 # fmt: on
 # isort: on
@@ -47,7 +47,7 @@ def check_orders(motion: Motion, truth: Truth) -> None:
     """Raises OrderError for the first order of `truth` that no event fulfils. motion: for the message."""
     for order in truth.orders:
         if order.event is None:
-            raise _unfulfilled(order, motion)
+            raise _unfulfilled(order, motion, truth)
 
 
 def _fired(order: Order, s: States) -> int:
@@ -114,7 +114,7 @@ def _apart(wanted: list[Ints], group: Ints) -> bool:
     return sum(map(len, ids)) == len(set().union(*ids))
 
 
-def _unfulfilled(order: Order, motion: Motion) -> OrderError:
+def _unfulfilled(order: Order, motion: Motion, truth: Truth) -> OrderError:
     s = motion.states()
     length = len(s.present)
     if order.time is None:
@@ -132,8 +132,19 @@ def _unfulfilled(order: Order, motion: Motion) -> OrderError:
             f"{WORDS[order.kind]}, within {PATIENCE:g} s" + (" and the time to walk there" * (order.kind != "split")),
             "move starts and goals, fire it earlier, or record for longer",
         )
+        since = [(e.start - 1) / truth.fps for e in truth.events or () if _stood_before(order, e, truth.fps)]
+        if since:
+            got += f"; the queue in which they stand began before, at {since[0]:g} s"
+            expected, remedy = "a queue that begins after it", f"let people walk for more than {ADVANCE_TIME:g} s to it"
     place = f"event {order.id} (seed {motion.seed})"
     return OrderError(file=f"scenario {motion.name}", place=place, got=got, expected=expected, remedy=remedy)
+
+
+def _stood_before(order: Order, event: GroupEvent, fps: float) -> bool:
+    """Returns True if an event is a queue of an order's people that began before the order fired, and went on."""
+    people = {p for part in order.before for p in part}
+    concerns = order.kind == event.kind == "queue" and _is_queue_of(people, event)
+    return concerns and order.time is not None and (event.start - 1) / fps < order.time < (event.end - 1) / fps
 
 
 def closest(order: Order, s: States, window: slice) -> str:

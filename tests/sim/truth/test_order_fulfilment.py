@@ -120,6 +120,9 @@ def test_queues_want_three_of_their_people() -> None:
         check(motion.replace(vel=pause), fewer)
     with pytest.raises(WorkError, match=r"a line of 2 people for 1\.7 s"):
         check(motion.replace(vel=pause), fewer)
+    before = truth.replace(events=(GroupEvent("queue", 11, 90, None, (), (), (1, 2, 3), (0, 0)),))
+    with pytest.raises(WorkError, match=r"the queue in which they stand began before, at 1 s; .* more than 3 s"):
+        check(motion, before)
     late = truth_of(motion, 128, "queue")  # 3 s of the rule would end later than 10 s and the way after the firing
     with pytest.raises(WorkError):
         check(motion, late)
