@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, cast
 import numpy as np
 
 from sim.clock import check_stride, every_nth
+from sim.draws import drawn
 from sim.scene.camera import px_per_m_at_centre
 from sim.scene.camera_placement import place_camera
 from sim.streams import check_streams
@@ -84,6 +85,8 @@ def observe(
     from which the motion was simulated. check: True makes reading the truth raise WorkError if an order of the script
     was not fulfilled. streams, stride: as for `simulate`.
     """
+    if getattr(scenario, "draws", None):
+        scenario = drawn(cast("Scenario", scenario), motion.seed, motion.repeat)
     check_stride(stride, motion.fps)
     camera = place_camera(scenario.camera, motion)
     wanted = frozenset(check_streams(streams, "png"))
@@ -122,7 +125,7 @@ def observe(
 
     # A frame's pixels are usually read right after its pictures.
     @lru_cache(maxsize=1)
-    def drawn(index: int) -> RenderedFrame:
+    def shown(index: int) -> RenderedFrame:
         assert renderer is not None
         shot = 1 + (index - 1) * stride
         if not left:
@@ -131,7 +134,7 @@ def observe(
 
     def pixels(index: int) -> PixelTruth:
         assert renderer is not None
-        known = drawn(index).pixels if labels else None
+        known = shown(index).pixels if labels else None
         return renderer.pixels(1 + (index - 1) * stride, disparity=disparity) if known is None else known
 
     def background() -> Image:
@@ -140,7 +143,7 @@ def observe(
 
     def frames() -> Iterator[Frame]:
         for d in sensed()[0]:
-            made = drawn(d.index)
+            made = shown(d.index)
             yield Frame(d.index, d.t, made.image, made.right, d)
 
     def light() -> Array:

@@ -237,7 +237,8 @@ class Motion(Frozen):
     script assigns the person to (a number of its own for a person alone, -1 while absent). height, width, depth (P,):
     of the body, m. free_speed (P,): walking speed alone, m/s. orders: of the script. measured: states from which the
     truth is measured; None: the frames themselves. never_arrive: groups that do not reach their goal. immobile:
-    people who stood still on the way."""
+    people who stood still on the way. unfired: id of each order that never fired, and the reason in words. clothes (P,
+    2, 3): red, green, blue of upper garment and trousers, grey levels; nan where any; None: all nan."""
 
     name: str
     seed: int
@@ -257,6 +258,8 @@ class Motion(Frozen):
     measured: States | None = None
     never_arrive: tuple[NeverArrives, ...] = ()
     immobile: tuple[Immobile, ...] = ()
+    unfired: tuple[tuple[str, str], ...] = ()
+    clothes: Array | None = None
 
     def states(self) -> States:
         """Returns the states from which the truth is measured."""

@@ -34,7 +34,7 @@ class OrderMark(NamedTuple):
 
     at: XY  # x, y of where it happens, m
     ways: dict[str, Way]  # those it opens, by name of the group; empty if groups stay or keep their goals
-    slots: Way = ()  # x, y of the places of a queue, m; empty for other orders
+    slots: Way = ()  # x, y of the places of a queue and its counters, m; empty for other orders
 
 
 def middle(value: Value) -> float:
@@ -78,6 +78,7 @@ def _mark(event: ScriptOrder, places: dict[str, tuple[XY, XY]], world: XY) -> Or
         places.update({name: (at, way[-1]) for name, way in ways.items()})
         return OrderMark(at, ways)
     inside = tuple((x, y) for x, y in queue_places(event, SLOTS) if 0 <= x <= world[0] and 0 <= y <= world[1])
+    inside += event.counters or ()
     if event.goal is None:
         return OrderMark(event.at, {}, inside)
     way = event.at, _at(event.goal)

@@ -70,6 +70,9 @@ def people(group: GroupSpec) -> str:
     words.append(f"to {place(group.goal)}")
     text = " ".join(words)
     text += f", at {number(group.speed, 'm/s')}" if group.speed is not None else ""
+    text += f", {number(group.height, 'm')} tall" if group.height is not None else ""
+    worn = [" or ".join(colours) for colours in (group.clothes, group.trousers) if colours is not None]
+    text += f", dressed in {' and '.join(worn)}" if worn else ""
     text += f", scattered by {number(group.scatter, 'm')}" if group.scatter != 0.0 else ""
     text += f", entering at {number(group.enter, 's')}" if group.enter != 0.0 else ""
     return f"{text}; then they {AT_GOAL[group.at_goal]}"
@@ -104,8 +107,10 @@ def order(event: ScriptOrder) -> str:
     if isinstance(event, SplitOrder):
         parts = [f"{p.id} ({p.size or 'rest'}) to {place(p.goal)}" for p in event.parts]
         return f"split {event.group} → {', '.join(parts)}"
+    where = "" if event.counters is None else f" at the next free of {', '.join(map(place, event.counters))}"
     served = "" if event.goal is None else f", then to {place(event.goal)}"
-    return f"queue {', '.join(event.groups)} at {place(event.at)}, served {number(event.service, 's')} each{served}"
+    lined = f"queue {', '.join(event.groups)} at {place(event.at)}"
+    return f"{lined}, served {number(event.service, 's')} each{where}{served}"
 
 
 def sensor(scenario: Scenario) -> list[str]:
@@ -128,7 +133,10 @@ def text(scenario: Scenario) -> str:
     lines += ["", "Orders"] + ([] if scenario.event else ["  none"])
     for k, event in enumerate(scenario.event):
         lines += [f"  {k + 1} {event.id}  {order(event)}", f"      {trigger(event.when)}"]
-    return "\n".join([*lines, "", "Sensor", *("  " + line for line in sensor(scenario)), ""])
+    draws = {f"draw.{name}": value.model_dump(exclude_none=True) for name, value in (scenario.draw or {}).items()}
+    lines += ["", "Sensor", *("  " + line for line in sensor(scenario))]
+    rows = [f"  {key} = {toml_value(value)}" for key, value in (draws | (scenario.draws or {})).items()]
+    return "\n".join([*lines, *(["", "Drawn for each seed (above: one example)"] if rows else []), *rows, ""])
 
 
 def cut(words: str, length: int) -> str:

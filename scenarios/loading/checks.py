@@ -126,6 +126,7 @@ def points(scenario: Scenario) -> Iterator[tuple[str, Point]]:
             continue
         if isinstance(event, QueueOrder):
             yield from ((f"{key}.at", slot) for slot in queue_places(event, QUEUE_PEOPLE))
+            yield from ((f"{key}.counters.{k}", point) for k, point in enumerate(event.counters or ()))
         yield from _way(key, event)
 
 
@@ -137,6 +138,7 @@ def _way(key: str, row: GroupSpec | SplitPart | MergeOrder | QueueOrder) -> Iter
 
 
 Sizes = dict[str, tuple[float, float]]  # least and greatest number of people of each existing group
+COUNTER_GAP = 0.8  # m, at least, between counters, and between a counter and the head of a queue
 QUEUE_PEOPLE = 3  # least number of people in a queue; sim.truth.queue_detection has the same number
 
 
@@ -242,6 +244,12 @@ def _queue(event: QueueOrder, key: str, alive: Sizes, gone: dict[str, str]) -> N
         for name in found:
             _exists(name, place, alive, gone)
         queued += [name for name in found if name not in queued]
+    for k, point in enumerate(event.counters or ()):
+        for other in (event.at, *(event.counters or ())[:k]):
+            if (gap := math.dist(point, other)) < COUNTER_GAP:
+                what = "the head of the queue" if other == event.at else f"the counter {list(other)}"
+                got = f"{list(point)}, {gap:.2f} m from {what}"
+                fail(f"{key}.counters.{k}", got, f"{COUNTER_GAP} m of room to stand", "move it away")
     people = sum(alive[name][1] for name in queued)
     if people < QUEUE_PEOPLE:
         got = f"{counted(int(people), 'person', 'people')} in {', '.join(queued)}"

@@ -16,19 +16,20 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from scenarios.errors import InputError
 from scenarios.limits import REPEATS
 from scenarios.loading import toml_files
 from scenarios.loading.checks import check
+from scenarios.loading.draws import check_draws, take_out
 from scenarios.loading.toml_files import CATALOGUE, SUITES, Setting, did_you_mean, dump, names, suite_names
 from scenarios.loading.validation import validate
 from scenarios.schema.scenario import ObservationSpec, Scenario
 from scenarios.schema.sensor import Sensor
-from scenarios.schema.values import Model, Name
+from scenarios.schema.values import Model, Name, problem
 
 
 class SensorFile(Model):
@@ -104,14 +105,41 @@ def load_observation(path: str | Path | None = None, set: Iterable[str] = ()) ->
 class SuiteEntry(Model):
     """One entry of a suite whose scenario is not loaded yet."""
 
-    name: Name = ""  # of the sequence, unique; absent: the scenario's name
-    scenario: str  # catalogue name or *.toml file
+    name: Name = ""  # of the sequence, unique; absent: the scenario's or suite's name
+    scenario: str = ""  # catalogue name or *.toml file
+    suite: str = ""  # in place of `scenario`: the entries of another suite, each with a name "<name>-<its name>"
     settings: tuple[str, ...] = Field((), alias="set")  # `key=value` texts
     # n makes the entries name-1 … name-n, whose numbers are one more key of their random streams; 0: one without number
     repeat: Annotated[int, Field(ge=1, le=REPEATS)] = 0
 
-    def expanded(self) -> list[SuiteEntry]:
-        """Returns the entries for which this entry of a file stands: name-1 … name-n for `repeat` n, else one."""
+    @model_validator(mode="after")
+    def _one_source(self) -> Self:
+        if bool(self.scenario) == bool(self.suite):
+            got = "scenario and suite" if self.scenario else "neither scenario nor suite"
+            raise problem(got, "exactly one of scenario, suite", "keep one" if self.scenario else "add one")
+        if self.suite and self.repeat:
+            raise problem("repeat beside suite", "repeat in the suite's own entries", "remove it")
+        return self
+
+    def expanded(self, beside: Path, chain: tuple[Path, ...] = ()) -> list[SuiteEntry]:
+        """Returns the entries for which this entry of a file stands: name-1 … name-n for `repeat` n, else one.
+
+        For a suite these are its entries, with its name before theirs. beside: folder of the file. chain: suites that
+        this one is part of.
+        """
+        if self.suite:
+            file = suite_file(f"suite:{self.suite}", beside)
+            assert file is not None
+            name = self.name or file.stem
+            return [
+                each.model_copy(
+                    update={
+                        "name": f"{name}-{each.name}", "settings": each.settings + self.settings,
+                        "scenario": str(toml_files.find(each.scenario, beside=file.parent).resolve()),
+                    }
+                )
+                for each in read_suite(file, chain).entry
+            ]  # fmt: skip
         name = self.name or Path(self.scenario).stem
         copies = [(f"{name}-{k}", k) for k in range(1, self.repeat + 1)] or [(name, 0)]
         return [self.model_copy(update={"name": each, "repeat": k}) for each, k in copies]
@@ -124,15 +152,21 @@ class Suite(Model):
     entry: Annotated[tuple[SuiteEntry, ...], Field(min_length=1)]
 
 
-def read_suite(path: Path) -> Suite:
-    """Returns the content of a suite file with each entry expanded; raises InputError if two get the same name."""
+def read_suite(path: Path, chain: tuple[Path, ...] = ()) -> Suite:
+    """Returns the content of a suite file with each entry expanded; raises InputError if two get the same name.
+
+    chain: suites that this one is part of.
+    """
+    if path.resolve() in chain:
+        got, expected = " → ".join(p.name for p in (*chain, path)), "suites that do not contain each other in a circle"
+        raise InputError(file=path, place="entry", got=got, expected=expected, remedy="remove one `suite`")
     suite = validate(toml_files.parse(path), path, model=Suite)
-    entries = tuple(each for entry in suite.entry for each in entry.expanded())
+    entries = tuple(each for row in suite.entry for each in row.expanded(path.parent, (*chain, path.resolve())))
     counts = Counter(entry.name for entry in entries)
     twice = next((name for name, count in counts.items() if count > 1), None)
     if twice is not None:
         got, expected = f"two entries named {twice!r}", "unique names"
-        raise InputError(file=path, place="entry", got=got, expected=expected, remedy="rename one")
+        raise InputError(file=path, place="entry", got=got, expected=expected, remedy="give one a `name`")
     return suite.model_copy(update={"entry": entries})
 
 
@@ -173,11 +207,14 @@ def is_catalogued(name: str) -> bool:
     return name.endswith(".toml") or name.startswith("suite:") or name in (*names(), *suite_names())
 
 
-def suite_file(name: str) -> Path | None:
-    """Returns the file of the suite that a name means, None if it means a scenario; InputError for an unknown name."""
+def suite_file(name: str, beside: Path | None = None) -> Path | None:
+    """Returns the file of the suite that a name means, None if it means a scenario; InputError for an unknown name.
+
+    beside: folder in which a path is sought first; None: the working folder.
+    """
     wanted = name.removeprefix("suite:")
     if wanted.endswith(".toml"):
-        path = toml_files.find(wanted)
+        path = toml_files.find(wanted, beside)
         return path if wanted != name or "entry" in toml_files.parse(path) else None
     if wanted in suite_names() and (wanted != name or name not in names()):
         return SUITES / f"{wanted}.toml"
@@ -209,6 +246,10 @@ def _entries(path: Path, settings: tuple[str | Setting, ...]) -> list[Entry]:
 
 def _build(path: Path, settings: tuple[str | Setting, ...]) -> Scenario:
     table, places = toml_files.apply_settings(toml_files.read(path), settings, path)
+    table, draws = take_out(table, path, places)
     scenario = validate(table, path, places, model=Scenario)
     check(scenario, path)
+    if draws:
+        scenario = scenario.model_copy(update={"draws": draws})
+        check_draws(scenario, path)
     return scenario

@@ -3,7 +3,7 @@
 A file with `extends = "base.toml"` (relative to itself, else in the catalogue) is merged over its base:
 
 - a table is merged key by key with the table of the same key; an empty table changes nothing;
-- a distribution and a `when` replace the value of the base as a whole, though they are tables, too;
+- a distribution, a link and a `when` replace the value of the base as a whole, though they are tables, too;
 - two lists of tables that all have an `id` (group, event, parts) are merged by id: rows with a known id are merged,
   rows with a new id are appended;
 - any other value replaces the value of the base;
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 CATALOGUE = Path(__file__).parents[1]
 SUITES = CATALOGUE / "suites"
 DISTRIBUTION_KEYS = frozenset({"normal", "uniform", "exponential", "poisson", "choice", "clip"})
+DRAW_KEYS = DISTRIBUTION_KEYS | {"link", "values"}
 
 Table = dict[str, Any]
 
@@ -118,7 +119,7 @@ def merge(below: Table, above: Table) -> Table:
 
 def _merge_value(key: str, below: Any, above: Any) -> Any:
     if isinstance(below, dict) and isinstance(above, dict):
-        whole = key == "when" or (bool(above) and above.keys() <= DISTRIBUTION_KEYS)
+        whole = key == "when" or (bool(above) and above.keys() <= DRAW_KEYS)
         return above if whole else merge(below, above)
     if _has_ids(below) and _has_ids(above):
         rows = list(below)
@@ -134,18 +135,28 @@ def _has_ids(value: Any) -> bool:
 
 
 def dump(scenario: BaseModel, defaults: bool = True) -> str:
-    """Returns a scenario, or another model of tables, as TOML; equal models give equal bytes.
+    """Returns a scenario, or another model of tables, as TOML with its draws; equal models give equal bytes.
 
     defaults: False leaves out the keys that have their default value.
     """
-    table = scenario.model_dump(mode="python", by_alias=True, exclude_none=True, exclude_defaults=not defaults)
+    draws: Table = getattr(scenario, "draws", None) or {}
+    table = scenario.model_dump(by_alias=True, exclude_none=True, exclude_defaults=not (defaults or draws))
+    table.pop("draws", None)
+    table = apply_settings(listed(table), [Setting(key, value) for key, value in draws.items()])[0]
     tables = {key: v for key, v in table.items() if isinstance(v, dict)}
-    arrays = {key: v for key, v in table.items() if isinstance(v, tuple) and v and isinstance(v[0], dict)}
+    arrays = {key: v for key, v in table.items() if isinstance(v, list) and v and isinstance(v[0], dict)}
     blocks = []
     for key in (key for key in table if key in tables or key in arrays):
         blocks += [f"[{key}]\n" + _lines(tables[key])] if key in tables else []
         blocks += [f"[[{key}]]\n" + _lines(row) for row in arrays.get(key, ())]
     return "\n".join([_lines({key: v for key, v in table.items() if key not in tables | arrays}), *blocks])
+
+
+def listed(value: Any) -> Any:
+    """Returns a copy of tables and arrays with lists in place of tuples."""
+    if isinstance(value, dict):
+        return {key: listed(inner) for key, inner in value.items()}
+    return [listed(inner) for inner in value] if isinstance(value, tuple | list) else value
 
 
 def _lines(table: dict[str, Any]) -> str:

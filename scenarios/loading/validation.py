@@ -56,10 +56,15 @@ def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None 
     found = [e for e in problems if e["type"] != "too_short"] or problems
     # Unknown keys come first, because a misspelt key explains a missing one.
     first = min(found, key=lambda e: e["type"] != "unknown_key")
-    path = tuple(s for k, s in enumerate(first["loc"]) if s not in TAGS and not (k == 2 and first["loc"][0] == "event"))
+    path = path_of(first["loc"])
     more = f" ({counted(len(found) - 1, 'more problem')})" if len(found) > 1 else ""
     path, got, expected, remedy = _words(first, path)
     raise wrong(path, got, expected, remedy + more)
+
+
+def path_of(loc: KeyPath) -> KeyPath:
+    """Returns the path in a scenario's table of a location in pydantic's errors, which names kinds of values, too."""
+    return tuple(s for k, s in enumerate(loc) if s not in TAGS and not (k == 2 and loc[0] == "event"))
 
 
 def _words(error: Any, path: KeyPath) -> tuple[KeyPath, str, str, str]:

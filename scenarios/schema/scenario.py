@@ -8,11 +8,13 @@ ends in Spec. Where a value may be a number or a distribution (scenarios.schema.
 from __future__ import annotations
 
 import math
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic.json_schema import SkipJsonSchema
 
 from scenarios.limits import FRAME_RATES, PEOPLE, PICTURE_SIZES, fits_picture
+from scenarios.schema.colours import Colours
 from scenarios.schema.sensor import Sensor
 
 # isort: off
@@ -110,6 +112,7 @@ FASTEST = 10.0  # m/s: as fast as a sprinter
 Speed = Annotated[Value, within(0.05, FASTEST, " m/s")]
 Seconds = Annotated[Value, within(0.0, 3600.0, " s")]  # of standing or being served
 Noise = Annotated[float, within(0.0, 1.0, " m/s")]
+Height = Annotated[Value, within(0.3, 3.0, " m")]
 Stray = Annotated[float, within(0.0, 2.0, " m")]
 Length = Annotated[float, within(0.1, 10_000.0, " m")]
 AtGoal = Literal["stand", "leave", "walk"]
@@ -232,7 +235,7 @@ class CrowdSpec(Model):
 
     free_speed: Speed = FREE_SPEED
     spacing: Annotated[Value, within(0.1, 10.0, " m")] = SPACING
-    height: Annotated[Value, within(0.3, 3.0, " m")] = HEIGHT
+    height: Height = HEIGHT
     slowdown_per_member: Annotated[float, within(0.0, FASTEST, " m/s")] = 0.05
     sway: Annotated[Value, within(0.0, 0.2, " m")] = SWAY
     velocity_noise: tuple[Noise, Noise] = (0.08, 0.13)
@@ -277,6 +280,9 @@ class GroupSpec(Model):
         scatter: distance of each member from its place in the group when the group enters, m; drawn for each member, in
             any direction
         speed: speed of the whole group, m/s; absent: follows from its members' speeds
+        height: body height of each member, m; absent: crowd.height
+        clothes: colour of the upper garment, or several, one of which is drawn for each member; absent: any
+        trousers: colour of the trousers, likewise
         enter: time of entry, s; 0 = present from the first frame; negative = during the warm-up
         at_goal: at the goal: stand = stay in conversation, leave = leave the scene, walk = walk straight on
         repeat: number of such groups; each is drawn independently
@@ -290,6 +296,9 @@ class GroupSpec(Model):
     via: tuple[Point, ...] = ()
     scatter: Annotated[Value, within(0.0, 10.0, " m")] = 0.0
     speed: Speed | None = None
+    height: Height | None = None
+    clothes: Colours | None = None
+    trousers: Colours | None = None
     enter: Value = 0.0
     at_goal: AtGoal = "stand"
     repeat: Annotated[int, Field(ge=1, le=5000)] = 1
@@ -401,13 +410,15 @@ class SplitOrder(Model):
 
 
 class QueueOrder(Model):
-    """An order: groups line up, are served one group after the other, and walk on.
+    """An order: groups line up, are served one group after the other or at several counters, and walk on.
 
     Attributes:
         id: name of the order
         type: groups line up and are served one by one
         groups: names of the groups that line up; `g-*` stands for all groups whose name begins with `g-`
         at: place of the first person in the queue, m
+        counters: service points, m: whoever is first in the queue walks to the nearest free one and is served there;
+            absent: people are served at the head of the queue
         direction_deg: direction from the head to the tail of the queue; 0 = +x, 90 = +y
         spacing: distance between neighbours in the queue, m
         service: time for which each group is served, s
@@ -419,6 +430,7 @@ class QueueOrder(Model):
     type: Literal["queue"]
     groups: Annotated[tuple[Pattern, ...], Field(min_length=1)]
     at: FixedPoint
+    counters: Annotated[tuple[FixedPoint, ...], Field(min_length=1)] | None = None
     direction_deg: float = 0.0
     spacing: Annotated[float, Field(ge=0.5, le=1.4)] = 0.8
     service: Seconds = Distribution(exponential=3.0)
@@ -443,6 +455,7 @@ class Scenario(Model):
         lead: time by which all walking groups start further on along their way (negative: further back), s; one draw
             for all
         mirror: true: with probability 0.5 the script is mirrored left to right
+        draw: named numbers that are drawn once for each seed, for the links of several keys; each is a distribution
     """
 
     schema_: Literal[1] = Field(alias="schema")
@@ -461,6 +474,9 @@ class Scenario(Model):
     crowd: CrowdSpec = CrowdSpec()
     group: Annotated[tuple[GroupSpec, ...], Field(min_length=1)]
     event: tuple[ScriptOrder, ...] = ()
+    draw: dict[Name, Distribution] | None = None
+    # Not a key of files: the distributions and links in places of fixed values, by key.
+    draws: SkipJsonSchema[dict[str, dict[str, Any]] | None] = None
 
 
 def group_names(group: GroupSpec) -> list[str]:

@@ -21,8 +21,7 @@ from sim.crowd.population import ScriptPlacement, draw_point
 from sim.elementary import length, unit
 from sim.rng import draw, rng
 from sim.truth.merge_split_rules import Separation, separation
-from sim.truth.order_fulfilment import RULE_TIME
-from sim.truth.queue_detection import QUEUE_PEOPLE
+from sim.truth.order_fulfilment import PATIENCE, RULE_TIME, queued
 from sim.types import Array, Order
 
 JOIN_RADIUS = 0.5  # m from the first free place: a group has joined
@@ -34,6 +33,7 @@ class ServiceQueue:
     """One queue at a service point. Groups are given by index; a group is served as a whole."""
 
     head: Array
+    counters: Array  # (K, 2) m: where people are served; K = 0: at the head
     along: Array  # (2,) unit vector from head to tail
     spacing: float  # between neighbouring places, m
     # service time in s of each group, by group index. State: joined: groups in the queue, head first.
@@ -42,10 +42,16 @@ class ServiceQueue:
     coming: list[int] = field(default_factory=list)  # groups on their way to it
     # time at which the group at the head is done, s; None while no group is being served
     busy_until: float | None = None
+    # by number of the counter: the group there or on its way there, and the time at which the group there is done, s
+    called: dict[int, int] = field(default_factory=dict)
+    until: dict[int, float] = field(default_factory=dict)
 
     def slot(self, k: int) -> Array:
         """Returns the place (2,) m of the k-th person in the queue; k = 0 is the head."""
-        return self.head + k * self.spacing * self.along
+        return self._behind(self.head, k)
+
+    def _behind(self, first: Array, k: int) -> Array:
+        return first + k * self.spacing * self.along
 
     def remove(self, g: int) -> None:
         """Takes group g out of the queue if the group is in it. If it is being served, its service is broken off."""
@@ -53,15 +59,18 @@ class ServiceQueue:
             self.busy_until = None
         self.joined = [other for other in self.joined if other != g]
         self.coming = [other for other in self.coming if other != g]
+        for k in [k for k, other in self.called.items() if other == g]:
+            del self.called[k]
+            self.until.pop(k, None)
 
     def advance(self, t: float, members: dict[int, list[int]], pos: Array) -> tuple[dict[int, Array], list[int]]:
         """Advances the queue to time t (s): ends and begins service, and lets groups join at the tail.
 
-        Returns the place (2,) m of each person by column, and a list with the index of the group whose service has
-        ended now, or an empty list. members: columns of each group, by group index; for a group that is still coming
+        Returns the place (2,) m of each person by column, and the indices of the groups whose service has ended now.
+        members: columns of each group, by group index; for a group that is still coming
         this list is sorted in place, nearest to the head first. pos (P, 2): m, by column.
         """
-        done = self._serve(t, members, pos)
+        done = self._serve_at_counters(t, members, pos) if len(self.counters) else self._serve(t, members, pos)
 
         def far(g: int, tail: int) -> float:
             return float(np.min(length(pos[members[g]] - self.slot(tail))))
@@ -74,7 +83,25 @@ class ServiceQueue:
         for g in self.coming:
             members[g].sort(key=lambda c: (float(length(pos[c] - self.head)), c))
         line = [column for g in self.joined + self.coming for column in members[g]]
-        return {column: self.slot(k) for k, column in enumerate(line)}, done
+        places = {column: self.slot(k) for k, column in enumerate(line)}
+        for k, g in self.called.items():
+            places |= {column: self._behind(self.counters[k], n) for n, column in enumerate(members[g])}
+        return places, done
+
+    def _serve_at_counters(self, t: float, members: dict[int, list[int]], pos: Array) -> list[int]:
+        """Returns the groups whose service ends by time t; calls the first group of the queue to a free counter."""
+        done = []
+        for k, g in list(self.called.items()):
+            if k not in self.until and length(pos[members[g][0]] - self.counters[k]) < SERVED_RADIUS:
+                self.until[k] = t + self.service[g]
+            elif t >= self.until.get(k, np.inf):
+                del self.until[k]
+                done.append(self.called.pop(k))
+        free = [k for k in range(len(self.counters)) if k not in self.called]
+        if free and self.joined and length(pos[members[self.joined[0]][0]] - self.head) < SERVED_RADIUS:
+            nearest = min(free, key=lambda k: float(length(self.counters[k] - self.head)))
+            self.called[nearest] = self.joined.pop(0)
+        return done
 
     def _serve(self, t: float, members: dict[int, list[int]], pos: Array) -> list[int]:
         """Returns the group whose service ends by time t, in a list; begins the service of the next."""
@@ -91,7 +118,6 @@ class ServiceQueue:
         return [self.joined.pop(0)]
 
 
-IN_PLACE = 0.4  # m from the own place in a queue
 EPS = 1e-9  # s
 
 
@@ -111,6 +137,9 @@ class PendingOrder:
     true_at: float | None = None  # time at which it had held long enough, s; None: not yet
     # s for which the order's rule (people are together, apart or in line, as ordered) has held without a break
     held_for: float = 0.0
+    # of a queue: states (P, 4) of everybody at each tick since the order fired
+    seen: list[Array] = field(default_factory=list)
+    nearest: float = np.inf  # m: least distance so far of which the trigger asks for a smaller one
     # before, after: columns (person id - 1) of the people of each group before and after the order; empty until it
     # fires. Times count from the first recorded frame.
     before: tuple[tuple[int, ...], ...] = ()
@@ -137,21 +166,43 @@ class PendingOrder:
             return when.after in come_true
         if when.distance_lt is not None:
             gaps = _separations(state, [groups.members[groups.alive[n]] for n in names])
-            return bool(gaps) and bool(max(gap.distance[0] for gap in gaps) < when.distance_lt)
+            gap = max((float(gap.distance[0]) for gap in gaps), default=np.inf)
+            self.nearest = min(self.nearest, gap)
+            return gap < when.distance_lt
         assert when.reach is not None
         g = groups.alive.get(when.reach.group)
         if g is None or not groups.all_present(g):
             return False
         at = groups.goals[g][0] if self.reach_at is None else self.reach_at
         middle = state[groups.members[g], :2].mean(axis=0)
-        return bool(length(middle - at) < when.reach.radius)
+        gap = float(length(middle - at))
+        self.nearest = min(self.nearest, gap)
+        return gap < when.reach.radius
 
-    def watch(self, t: float, holds: bool) -> None:
-        """Updates `held_for` at a tick of time t (s). holds: whether the order's rule holds at this tick.
+    def obstacle(self, groups: GroupState) -> str:
+        """Returns in words, at the end of the recording, why the order has not fired."""
+        when, names = self.order.when, concerned(self.order, list(groups.alive))
+        absent = [n for n in names if n not in groups.alive or not groups.all_present(groups.alive[n])]
+        if absent or not names:
+            return f"at the end, {', '.join(absent) or 'all groups'} were not in the scene"
+        if self.met_at is not None:
+            return f"its trigger was met at {self.met_at:g} s, and `delay` is {self.delay:.1f} s"
+        if when.after is not None:
+            return f"{when.after} had not come true"
+        return f"its groups came within {self.nearest:.2f} m" if np.isfinite(self.nearest) else ""
 
-        Sets `true_at` to t if the rule has held without a break for the time that this kind of order requires.
+    def watch(self, t: float, state: Array) -> None:
+        """Sets `true_at` to t (s) if the order's rule has held by now for the time that its kind requires.
+
+        state (P, 4): x, y, vx, vy by column, nan while absent. A queue is measured as the truth measures it.
         """
-        self.held_for = self.held_for + 1 / SCRIPT_RATE if holds else 0.0
+        if isinstance(self.order, QueueOrder):
+            if len(self.seen) <= PATIENCE * SCRIPT_RATE:
+                self.seen.append(state.copy())
+                done = queued({c + 1 for c in self.after[0]}, np.array(self.seen), SCRIPT_RATE)
+                self.true_at = t if done else None
+            return
+        self.held_for = self.held_for + 1 / SCRIPT_RATE if rule_holds(self, state) else 0.0
         if self.held_for >= RULE_TIME[self.order.type] - EPS:
             self.true_at = t
 
@@ -166,16 +217,12 @@ def concerned(order: MergeOrder | SplitOrder | QueueOrder, alive: list[str]) -> 
     return list(dict.fromkeys(n for pattern in order.groups for n in expand(pattern, alive)))
 
 
-def rule_holds(pending: PendingOrder, state: Array, targets: Array) -> bool:
-    """Returns True if the rule of an order that has fired holds at this tick.
+def rule_holds(pending: PendingOrder, state: Array) -> bool:
+    """Returns True if the rule of a merge or split that has fired holds at this tick.
 
-    state (P, 4): x, y, vx, vy by column, nan while absent. targets (P, 2): places in the queue by column, m.
+    state (P, 4): x, y, vx, vy by column, nan while absent.
     """
     order = pending.order
-    if isinstance(order, QueueOrder):
-        columns = list(pending.after[0])
-        off = length(state[columns, :2] - targets[columns])
-        return bool(np.sum(off < IN_PLACE) >= min(QUEUE_PEOPLE, len(columns)))
     parts = [list(p) for p in (pending.before if isinstance(order, MergeOrder) else pending.after)]
     if not all(np.isfinite(state[p]).all() for p in parts):
         return False
@@ -200,8 +247,8 @@ def groups_made(scenario: Scenario) -> int:
 class OrderExecution:
     """Carries out the orders of one scenario on the groups of a running simulation.
 
-    State: pending: all orders, fired or not; come_true: ids of orders whose rule has held long enough; queues: the
-    opened ones, by index of their order in the file.
+    State: pending: all orders, fired or not; come_true: ids of orders whose rule has held long enough; awaited: ids of
+    orders that others wait for (`after`); queues: the opened ones, by index of their order in the file.
     """
 
     def __init__(
@@ -210,6 +257,7 @@ class OrderExecution:
         self.groups, self.placement, self.seed, self.repeat = groups, placement, seed, repeat
         self.queues: dict[int, ServiceQueue] = {}
         self.come_true: set[str] = set()
+        self.awaited = {order.when.after for order in scenario.event}
         self.pending = [self._pending(order, k) for k, order in enumerate(scenario.event)]
 
     def _rng(self, role: str, *keys: int) -> np.random.Generator:
@@ -236,9 +284,9 @@ class OrderExecution:
                 elif isinstance(pending.order, SplitOrder):
                     self._split(pending, pending.order, state)
                 else:
-                    self._line_up(pending, pending.order)
-            elif pending.fired is not None and pending.true_at is None:
-                pending.watch(t, rule_holds(pending, state, self.groups.targets))
+                    self._line_up(pending, pending.order, state)
+            elif pending.fired is not None and pending.true_at is None and pending.order.id in self.awaited:
+                pending.watch(t, state)
                 if pending.true_at is not None:
                     self.come_true.add(pending.order.id)
         for queue in self.queues.values():
@@ -302,7 +350,7 @@ class OrderExecution:
             groups.arrays.heading[g] = groups.arrays.heading[parent]
         pending.after = tuple(after)
 
-    def _line_up(self, pending: PendingOrder, order: QueueOrder) -> None:
+    def _line_up(self, pending: PendingOrder, order: QueueOrder, state: Array) -> None:
         groups = self.groups
         queuing = [groups.alive[n] for n in concerned(order, list(groups.alive))]
         for queue in self.queues.values():
@@ -312,7 +360,8 @@ class OrderExecution:
         service = {g: draw(order.service, r) for g in queuing}
         along = self.placement.vector(unit(order.direction_deg / 180 * np.pi))
         head = self.placement.point(np.array(order.at))
-        self.queues[pending.index] = ServiceQueue(head, along, order.spacing, service, coming=list(queuing))
+        counters = np.array([self.placement.point(np.array(at)) for at in order.counters or ()]).reshape(-1, 2)
+        self.queues[pending.index] = ServiceQueue(head, counters, along, order.spacing, service, coming=list(queuing))
         columns = [c for g in queuing for c in groups.members[g]]
         groups.queue_of[columns] = pending.index
         pending.before = tuple(tuple(groups.members[g]) for g in queuing)
@@ -333,6 +382,10 @@ class OrderExecution:
             groups.go(g, state[columns, :2].mean(axis=0), [], goal, finish, groups.walking_speed(columns))
             groups.settled.discard(g)
             groups.places[columns] = walking(len(columns), groups.spacing[g])
+
+    def unfired(self) -> tuple[tuple[str, str], ...]:
+        """Returns the id of each order that has not fired, and why, in words."""
+        return tuple((p.order.id, p.obstacle(self.groups)) for p in self.pending if p.fired is None)
 
     def record(self, frames: FrameTimes) -> tuple[Order, ...]:
         """Returns all orders of the script with the frame (from 1) of firing, and the people before and after."""

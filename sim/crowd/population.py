@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from scenarios.errors import InputError, counted
+from scenarios.schema.colours import rgb
 from scenarios.schema.scenario import CrowdSpec, GroupSpec, Scenario, Stop, group_names
 from scenarios.schema.values import Distribution, Point, Value
 from sim.crowd.formation import to_world, walking
@@ -100,6 +101,8 @@ class Person:
     height: float  # of the body, m
     sway: float  # amplitude of the sideways movement with each stride at 1.34 m/s, m
     phase: float  # of the strides at first, rad
+    # (2, 3) red, green, blue of upper garment and trousers, grey levels; nan where any
+    clothes: Array = field(default_factory=lambda: np.full((2, 3), np.nan))
 
 
 @dataclass
@@ -195,12 +198,18 @@ def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int],
     members = []
     for m in range(size):
         p = draws.rng("person", *key, m)
-        own_draws = (draw(crowd.free_speed, p), draw(crowd.height, p), draw(crowd.sway, p), 2 * np.pi * p.random())
-        members.append(Person(column + m, (*key, m), *own_draws))
+        height = crowd.height if spec.height is None else spec.height
+        own_draws = (draw(crowd.free_speed, p), draw(height, p), draw(crowd.sway, p), 2 * np.pi * p.random())
+        clothes = np.array([_colour(colours, p) for colours in (spec.clothes, spec.trousers)])
+        members.append(Person(column + m, (*key, m), *own_draws, clothes))
     speed = own if own is not None else walking_speed([m.free_speed for m in members], crowd.slowdown_per_member)
     q = draws.rng("group", *key, 2)
     stops = draw_stops(spec.stops, size, lambda point: draw_point(point, draws.placement, q), q)
     return EnteringGroup(name, -1, members, np.zeros(2), goal, via, speed, spacing, enter, spec.at_goal, stops)
+
+
+def _colour(colours: tuple[str, ...] | None, r: np.random.Generator) -> tuple[float, ...]:
+    return (np.nan,) * 3 if colours is None else rgb(colours[int(r.integers(len(colours)))])
 
 
 def walking_speed(free: list[float], slowdown: float) -> float:

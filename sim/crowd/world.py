@@ -31,6 +31,7 @@ from sim.crowd.order_execution import OrderExecution, groups_made
 from sim.crowd.population import BODY_RADIUS, EnteringGroup, draw_population, fluctuations, script_placement
 from sim.crowd.stops import Stops
 from sim.crowd.wayfinding import Wayfinding
+from sim.draws import drawn
 from sim.elementary import cos, length, sin
 from sim.geometry.walls import blocked
 from sim.scene.body import DEPTH_SHARE, SHOULDER_SHARE
@@ -48,7 +49,7 @@ WRITE = pymunk.batch.BodyFields.FORCE
 
 def run(scenario: Scenario, seed: int, repeat: int = 0) -> Motion:
     """Returns the whole motion of a scenario for a seed, without the warm-up."""
-    return World(scenario, seed, repeat).run()
+    return World(drawn(scenario, seed, repeat), seed, repeat).run()
 
 
 class World:
@@ -261,7 +262,8 @@ class World:
             pos=state[..., :2], vel=state[..., 2:], heading=heading, present=there, intent=intent, height=height,
             width=SHOULDER_SHARE * height, depth=DEPTH_SHARE * height,
             free_speed=np.array([m.free_speed for m in self.members]), scene=self.scene,
-            orders=self.orders.record(frames), measured=measured,
+            orders=self.orders.record(frames), measured=measured, unfired=self.orders.unfired(),
+            clothes=np.array([m.clothes for m in self.members]),
         )  # fmt: skip
 
 

@@ -24,6 +24,7 @@ from scenarios.schema.scenario import ObservationSpec
 from sim.clock import check_stride
 from sim.dataset.replay import WHOLE, Cut, replay_name, resolve_replay
 from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
+from sim.draws import drawn
 from sim.store import sequence_folder
 from sim.store.atomic import PARTIAL, lock_folder, remove_partials, write_file
 from sim.store.group_files import read_immobile, read_never_arrives
@@ -214,11 +215,15 @@ def generate(
     folder = root / f"flockscope-{split}"
     settings, wanted = tuple(set), check_streams(streams, images, background)
     found = [e for entry in entries for e in (resolve(entry, settings) if isinstance(entry, str) else [entry])]
-    output_paths(folder, [entry.name for entry in found], source="entries")
-    for entry in found:
-        check_stride(stride, entry.scenario.camera.fps)
-    paths = [(output_path(folder, e.name, f"-s{seed:05d}"), e, seed) for e, seed in product(found, seeds)]
-    jobs = [SequenceJob(*job, wanted, images, stride) for job in paths]
+    try:
+        output_paths(folder, [entry.name for entry in found], source="entries")
+    except InputError as error:
+        raise error.replaced(remedy='combine them in a suite: entry = [{ suite = "NAME" }, …], see the docs') from None
+    jobs = []
+    for entry, seed in product(found, seeds):
+        one = replace(entry, scenario=drawn(entry.scenario, seed, entry.repeat))
+        check_stride(stride, one.scenario.camera.fps)
+        jobs.append(SequenceJob(output_path(folder, one.name, f"-s{seed:05d}"), one, seed, wanted, images, stride))
     with _dataset(root, folder):
         for job in jobs:
             stored_manifest(job)

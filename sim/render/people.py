@@ -37,12 +37,15 @@ LEVEL_SD, TINT_SD = 0.28, 0.06  # sd of the logarithm of a garment's brightness,
 CUT_SHARES = (0.45, 0.06, 0.05, 0.1, 0.24, 0.1)  # of the cuts PLAIN … DRESS in sim.render.people_kernels
 
 
-def clothing_atlas(people: int, seed: int, repeat: int = 0) -> NDArray[np.uint8]:
+def clothing_atlas(people: int, seed: int, repeat: int = 0, clothes: Array | None = None) -> NDArray[np.uint8]:
     """Returns the texture pages (P, 2, texels) uint8 of people 1 … P; the second axis is body, head.
+
+    clothes: as of a Motion.
 
     A page has UP rows from the ground upwards, ROUND + 1 columns round the body (the first repeated), and B, G, R.
     """
-    from sim.render.people_kernels import ROUND, UP, draw_page
+    from sim.render.people_kernels import ROUND, SECOND, SHIRT, UP, draw_page
+    from sim.render.people_kernels import TROUSERS as LEGS
 
     pages, drawn = np.empty((people, 2, UP, ROUND + 1, 3), np.uint8), np.empty((UP, ROUND, 3))
     for k in range(people):
@@ -58,6 +61,9 @@ def clothing_atlas(people: int, seed: int, repeat: int = 0) -> NDArray[np.uint8]
         ]  # fmt: skip
         level = np.exp(LEVEL_SD * source.normal(size=(6, 1))) * np.exp(TINT_SD * source.normal(size=(6, 3)))
         colours = np.clip(np.array(chosen) * level, 12, 240)
+        for rows, given in zip(([SHIRT, SECOND], [LEGS]), () if clothes is None else clothes[k], strict=False):
+            if np.isfinite(given).all():
+                colours[rows] = given[::-1]
         for part in range(2):
             draw_page(style, key, colours, part, drawn)
             pages[k, part, :, :ROUND] = np.clip(drawn + 0.5, 0, 255)

@@ -126,7 +126,7 @@ class Renderer:
 
     @cached_property
     def _atlas(self) -> NDArray[np.uint8]:
-        return clothing_atlas(self.motion.present.shape[1], self.motion.seed, self.motion.repeat)
+        return clothing_atlas(self.motion.present.shape[1], self.motion.seed, self.motion.repeat, self.motion.clothes)
 
     @cached_property
     def _noise(self) -> NDArray[np.int16]:

@@ -127,6 +127,13 @@ def stretches(pair: Ints, frame: Ints, least: int, bridge: int = 1) -> tuple[Int
     return pair[start[long]], frame[start[long]], frame[end[long]]
 
 
+def longest_time(holds: Bools, rate: float, bridge: float = 0.0) -> float:
+    """Returns the longest time in s for which flags (T,) are True. rate: flags per s. bridge: longest gap to bridge."""
+    frame = np.flatnonzero(holds)
+    _, first, last = stretches(np.zeros_like(frame), frame, 1, max(1, frames_of(bridge, rate)))
+    return float((last - first + 1).max(initial=0)) / rate
+
+
 def strangers(motion: MotionRows, group: Ints, fps: float) -> Near:
     """Returns the stretches of time in which two people satisfy the merge rule but do not belong together.
 

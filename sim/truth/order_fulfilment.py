@@ -2,7 +2,8 @@
 
 An order (merge, split or queue) is fulfilled by a measured event of its kind, with the right people, that starts no
 earlier than the order fired. The event's rule must have held for its whole time (2 s; queues 3 s) within PATIENCE (10
-s) of the firing. Orders are carried out by sim.crowd.order_execution.
+s) of the firing.
+Orders are carried out by sim.crowd.order_execution.
 """
 
 from __future__ import annotations
@@ -17,12 +18,15 @@ from sim.elementary import length
 # isort: off
 # fmt: off
 from sim.truth.merge_split_rules import (
-    HOLD_TIME, MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_DISTANCE, SPLIT_VELOCITY, separation,
+    HOLD_TIME, MERGE_DISTANCE, MERGE_VELOCITY, SPLIT_DISTANCE, SPLIT_VELOCITY, longest_time, separation,
+)
+from sim.truth.queue_detection import (
+    ADVANCE_TIME, MAX_SPACING, MIN_SPACING, QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED, longest_line, queues,
 )
 # fmt: on
 # isort: on
-from sim.truth.queue_detection import MAX_SPACING, MIN_SPACING, QUEUE_PEOPLE, QUEUE_TIME, WAITING_SPEED
-from sim.types import GroupEvent, Ints, Motion, Order, States, Truth
+from sim.truth.motion_rows import MotionRows
+from sim.types import Array, GroupEvent, Ints, Motion, Order, States, Truth
 
 PATIENCE = 10.0  # s from the firing of an order until its rule has come true
 # s for which the rule of each kind of order must hold
@@ -42,7 +46,7 @@ def check_orders(motion: Motion, truth: Truth) -> None:
     """Raises OrderError for the first order of `truth` that no event fulfils. motion: for the message."""
     for order in truth.orders:
         if order.event is None:
-            raise _unfulfilled(order, motion)
+            raise _unfulfilled(order, motion, truth)
 
 
 def _fired(order: Order, s: States) -> int:
@@ -58,18 +62,30 @@ def fulfilment(order: Order, events: Sequence[GroupEvent], group: Ints, s: State
     if order.time is None:
         return None
     first = _fired(order, s) + 1
-    last = first + (PATIENCE - RULE_TIME[order.kind]) * s.rate
+    patience = PATIENCE - RULE_TIME[order.kind]
     for k, event in enumerate(events):
-        if event.kind in KINDS[order.kind] and first <= event.start <= last and _concerns(event, order, group):
+        late = event.start - first
+        concerns = event.kind in KINDS[order.kind] and late >= 0 and _concerns(event, order, group)
+        if concerns and late <= patience * s.rate:
             return k
     return None
+
+
+def queued(people: set[int], states: Array, rate: float) -> bool:
+    """Returns True if these people (ids) have made a queue in the states (T, P, 4): x, y, vx, vy, nan while absent."""
+    pos, vel, present = states[..., :2], states[..., 2:], np.isfinite(states[..., 0])
+    rows = MotionRows.of_table(pos, vel, present, np.full(present.shape, -1))
+    return any(_is_queue_of(people, event) for event in queues(rows, rate))
+
+
+def _is_queue_of(people: set[int], event: GroupEvent) -> bool:
+    return len(people & set(event.members)) >= min(QUEUE_PEOPLE, len(people))
 
 
 def _concerns(event: GroupEvent, order: Order, group: Ints) -> bool:
     """Returns True if an event of the right kind and time has the people and the effect that the order asks for."""
     if order.kind == "queue":
-        people = {p for part in order.before for p in part}
-        return len(people & set(event.members)) >= min(QUEUE_PEOPLE, len(people))
+        return _is_queue_of({p for part in order.before for p in part}, event)
     wanted = [np.array(part, dtype=np.int64) - 1 for part in order.after]
     done = _together if order.kind == "merge" else _apart
     people = {p for part in order.after for p in part}
@@ -89,11 +105,13 @@ def _apart(wanted: list[Ints], group: Ints) -> bool:
     return sum(map(len, ids)) == len(set().union(*ids))
 
 
-def _unfulfilled(order: Order, motion: Motion) -> OrderError:
+def _unfulfilled(order: Order, motion: Motion, truth: Truth) -> OrderError:
     s = motion.states()
     length = len(s.present)
     if order.time is None:
-        got, expected = f"a {order.kind} that never fired", f"its trigger within the {length / s.rate:g} s recorded"
+        why = dict(motion.unfired).get(order.id)
+        got = f"a {order.kind} that never fired" + (f": {why}" if why else "")
+        expected = f"its trigger within the {length / s.rate:g} s recorded"
         remedy = "loosen its `when`, or let the groups come closer"
     else:
         fired = _fired(order, s)
@@ -105,8 +123,19 @@ def _unfulfilled(order: Order, motion: Motion) -> OrderError:
             f"{WORDS[order.kind]}, within {PATIENCE:g} s",
             "move starts and goals, fire it earlier, or record for longer",
         )
+        since = [(e.start - 1) / truth.fps for e in truth.events or () if _stood_before(order, e, truth.fps)]
+        if since:
+            got += f"; the queue in which they stand began before, at {since[0]:g} s"
+            expected, remedy = "a queue that begins after it", f"let people walk for more than {ADVANCE_TIME:g} s to it"
     place = f"event {order.id} (seed {motion.seed})"
     return OrderError(file=f"scenario {motion.name}", place=place, got=got, expected=expected, remedy=remedy)
+
+
+def _stood_before(order: Order, event: GroupEvent, fps: float) -> bool:
+    """Returns True if an event is a queue of an order's people that began before the order fired, and went on."""
+    people = {p for part in order.before for p in part}
+    concerns = order.kind == event.kind == "queue" and _is_queue_of(people, event)
+    return concerns and order.time is not None and (event.start - 1) / fps < order.time < (event.end - 1) / fps
 
 
 def closest(order: Order, s: States, window: slice) -> str:
@@ -114,9 +143,12 @@ def closest(order: Order, s: States, window: slice) -> str:
     pos, vel = s.pos[window], s.vel[window]
     if order.kind == "queue":
         people = [p - 1 for part in order.before for p in part]
-        slow = s.present[window][:, people] & (length(np.nan_to_num(vel[:, people])) < WAITING_SPEED)
+        there, intent = s.present[window][:, people], s.intent[window][:, people]
+        slow = there & (length(np.nan_to_num(vel[:, people])) < WAITING_SPEED)
         most = slow.sum(axis=1).max(initial=0)
-        return f"at most {most} of {len(people)} people slower than {WAITING_SPEED:g} m/s at once"
+        line, time = longest_line(MotionRows.of_table(pos[:, people], vel[:, people], there, intent), s.rate)
+        words = f"at most {most} of {len(people)} people slower than {WAITING_SPEED:g} m/s at once"
+        return f"{words}, a line of {line} people for {time:g} s" if line else f"{words}, no two of them in line"
     first, *others = (np.array(p, np.int64) - 1 for p in (order.before if order.kind == "merge" else order.after))
     found = separation(pos, vel, first, np.concatenate(others))
     gap = np.where(np.isfinite(found.distance), found.distance, np.nan)
@@ -124,4 +156,7 @@ def closest(order: Order, s: States, window: slice) -> str:
         return "the parts were never there together"
     word, k = ("nearest", np.nanargmin(gap)) if order.kind == "merge" else ("furthest", np.nanargmax(gap))
     difference = found.velocity_difference[k]
-    return f"the first part {word} {gap[k]:.2f} m from the others, velocities then differing by {difference:.2f} m/s"
+    held = found.merge_rule() if order.kind == "merge" else found.split_rule()
+    time = longest_time(held, s.rate)
+    words = f"the first part {word} {gap[k]:.2f} m from the others, velocities then differing by {difference:.2f} m/s"
+    return f"{words}; both fit for {time:g} s at most"

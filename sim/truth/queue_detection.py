@@ -21,7 +21,7 @@ import numpy as np
 
 from sim.elementary import atan2, length, unit
 from sim.geometry.polygons import cross
-from sim.truth.merge_split_rules import close_pairs, frames_of, stretches
+from sim.truth.merge_split_rules import close_pairs, frames_of, longest_time, stretches
 from sim.truth.motion_rows import MotionRows
 from sim.types import Array, Bools, GroupEvent, Ints
 
@@ -218,6 +218,21 @@ def queues(motion: MotionRows, fps: float) -> list[GroupEvent]:
             people, place = tuple((columns + 1).tolist()), (f.middle.real, f.middle.imag)
             found.append(GroupEvent("queue", f.since + 1, f.now.t + 1, None, before, after, people, place))
     return sorted(found, key=lambda e: (e.start, e.end, e.members))
+
+
+def longest_line(motion: MotionRows, fps: float) -> tuple[int, float]:
+    """Returns the number of people, at most 3, for which there was a line, and the line's longest time in s.
+
+    Without a line of 2 people both are 0. Gaps up to 1.5 s are bridged.
+    """
+    stride = max(1, round(fps / MAX_RATE))
+    lines = _lines(motion, waiting_people(motion, fps), stride)
+    for people in range(QUEUE_PEOPLE, 1, -1):
+        holds = np.zeros(motion.length, np.bool_)
+        holds[[line.t for line in lines if len(line.order) >= people]] = True
+        if holds.any():
+            return people, longest_time(holds, fps, BRIDGE_TIME)
+    return 0, 0.0
 
 
 def _groups_of(label: Ints) -> tuple[int, ...]:

@@ -35,10 +35,44 @@ def test_entries_expand_in_order(path: Path) -> None:
     assert resolve(f"suite:{file}") == entries
 
 
+def test_a_suite_is_made_of_suites(path: Path) -> None:
+    """Two of them may have entries of one name; the sequences are those of the suites, with their copies."""
+    text = "entry = [{ scenario = 'tour.toml' }, { name = 'many', scenario = 'tour.toml', repeat = 2 }]"
+    (path.parent / "part").mkdir()
+    (path.parent / "part/small.toml").write_text(text)
+    (path.parent / "part/tour.toml").write_text(path.read_text().replace("duration = 30.0", "duration = 31.0"))
+    file = suite(
+        path,
+        """
+        entry = [
+          { suite = "part/small.toml", set = ["camera.fps=7"] },
+          { name = "again", suite = "part/small.toml" },
+          { suite = "occlusion" },
+          { scenario = "tour.toml" },
+        ]
+        """,
+    )
+    entries = resolve(file)
+    parts = ["tour", "many-1", "many-2"]
+    occlusion = resolve("occlusion")
+    names = [f"{whole}-{part}" for whole in ("small", "again") for part in parts]
+    assert [e.name for e in entries] == [*names, *(f"occlusion-{e.name}" for e in occlusion), "tour"]
+    assert [(e.repeat, e.scenario.duration) for e in entries[:6]] == [(0, 31), (1, 31), (2, 31)] * 2
+    assert [e.scenario.camera.fps for e in entries[:6]] == [7] * 3 + [10] * 3
+    assert entries[-1].scenario.duration == 30
+    for entry, own in zip(entries[6:], occlusion, strict=False):
+        assert entry.scenario.model_copy(update={"name": own.name}) == own.scenario
+    assert {row.name for row in rows(file)} >= {"small-tour", "again-tour", "tour"}
+
+
 WRONG = [
     ("entry = []", "entry", "[]"),
     ("entrys = []", "entrys", "unknown key"),
-    ("entry = [{ name = 'a' }]", "entry.0.scenario", "nothing"),
+    ("entry = [{ name = 'a' }]", "entry.0", "neither scenario nor suite"),
+    ("entry = [{ scenario = 'tour.toml', suite = 'quick' }]", "entry.0", "scenario and suite"),
+    ("entry = [{ suite = 'quick', repeat = 2 }]", "entry.0", "repeat"),
+    ("entry = [{ suite = 'quick' }, { suite = 'quick' }]", "entry", "two entries named 'quick-"),
+    ("entry = [{ suite = 'mine.toml' }]", "entry", "mine.toml → mine.toml"),
     ("entry = [{ scenario = 'tour.toml', repet = 2 }]", "entry.0.repet", "unknown key"),
     ("entry = [{ scenario = 'tour.toml', repeat = 0 }]", "entry.0.repeat", "0"),
     ("entry = [{ scenario = 'tour.toml', repeat = 1000000000 }]", "entry.0.repeat", "1000000000"),

@@ -1,6 +1,7 @@
 """Orders about groups that other orders made, about groups named twice, and about groups in a queue."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -66,6 +67,86 @@ def test_a_group_that_merges_leaves_its_queue(tmp_path):
     assert len(last) == len(made.group) + 4
     assert np.all(np.linalg.norm(last[[0, 1, 4]] - [3, 10], axis=1) < 3.5), "the merged group goes to its goal"
     assert np.all(np.linalg.norm(last[[2, 3, 5, 6]] - [28, 10], axis=1) < 3.5), "all others are served"
+
+
+ONE_BY_ONE = (
+    '{ id = "l", type = "queue", groups = ["q-*"], at = [24, 6], direction_deg = 180, service = 1.0, '
+    "when = { time = 1 } }"
+)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_an_order_after_a_queue_fires_when_the_queue_is_measured(tmp_path, seed):
+    """Though nobody holds the same place for 3 s, as people are served one by one and advance."""
+    after = '{ id = "m", type = "merge", groups = ["a", "b"], into = "ab", when = { after = "l" } }'
+    scenario(tmp_path, ONE_BY_ONE, after)
+    made = load(tmp_path / "scene.toml", ["group.q.repeat=8"])
+    truth = observe(made, run(made, seed)).truth
+    line, merge = truth.orders
+    rule_time = merge.time - (truth.events[line.event].start - 1) / made.camera.fps
+    assert 2.7 <= rule_time <= 4.0, "3 s, and some until people who move are seen to wait again"
+
+
+@pytest.mark.parametrize(
+    ("when", "reason"),
+    [
+        ("{ distance_lt = 0.2 }", r"its groups came within \d\.\d\d m"),
+        ('{ reach = { group = "a", at = [3, 11] } }', r"its groups came within \d\.\d\d m"),
+        ('{ after = "l" }', "l had not come true"),
+        ("{ time = 20, delay = { choice = [3, 30, 30, 30] } }", "its trigger was met at 20 s, and `delay` is 30.0 s"),
+    ],
+)
+def test_the_reason_is_given_for_an_order_that_never_fires(tmp_path, when, reason):
+    after = f'{{ id = "m", type = "merge", groups = ["a", "b"], into = "ab", when = {when} }}'
+    scenario(tmp_path, ONE_BY_ONE, after)
+    made = load(tmp_path / "scene.toml", ["duration=23.8", "event.l.when.time=21"])
+    ((order, words),) = run(made, 1).unfired
+    assert order == "m"
+    assert re.fullmatch(reason, words)
+
+
+COUNTERS = (
+    '{ id = "l", type = "queue", groups = ["q-*"], at = [21, 6], direction_deg = 180, counters = [[24, 4], [24, 8]], '
+    'service = 4.0, goal = [29, 6], at_goal = "leave", when = { time = 1 } }'
+)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_the_first_of_one_line_goes_to_the_next_free_counter(tmp_path, seed):
+    """Everybody is served once, at one of both counters, alone, for the time of service, in the order of the line."""
+    scenario(tmp_path, COUNTERS)
+    made = load(
+        tmp_path / "scene.toml", ["group.q.repeat=6", "group.q.start=[{ uniform = [12, 18] }, 6]", "duration=45"]
+    )
+    motion = run(made, seed)
+    served = []
+    for at in made.event[0].counters:
+        there = np.linalg.norm(motion.pos - np.array(at), axis=2) < 0.35
+        assert there.sum(axis=1).max() == 1
+        served += [
+            (int(np.flatnonzero(there[:, p])[0]), p) for p in range(4, 10) if there[:, p].sum() > 3.5 * motion.fps
+        ]
+    assert sorted(p for _, p in served) == [4, 5, 6, 7, 8, 9], "groups a and b, of two people each, do not queue"
+    at_head = np.linalg.norm(motion.pos - [21, 6], axis=2) < 0.35
+    line = sorted(range(4, 10), key=lambda p: int(np.flatnonzero(at_head[:, p])[0]))
+    assert [p for _, p in sorted(served)] == line
+    assert not motion.present[-1, 4:].any(), "all leave after service"
+    order = observe(made, motion).truth.orders[0]
+    assert order.event is not None, "the waiting line is measured as a queue"
+
+
+def test_a_group_that_merges_leaves_its_counter(tmp_path):
+    merge = '{ id = "m", type = "merge", groups = ["a", "q-1"], into = "aq", goal = [3, 10], when = { time = 12 } }'
+    scenario(tmp_path, COUNTERS, merge)
+    made = load(
+        tmp_path / "scene.toml", ["group.q.start=[{ uniform = [18, 20] }, 6]", "event.l.service=60", "duration=40"]
+    )
+    world = World(made, 0, 0)
+    *_, last = (state.copy() for state, _ in world.ticks(400))
+    (queue,) = world.orders.queues.values()
+    served = {world.groups.members[g][0] for g in queue.called.values()}
+    assert served == {5, 6}, "the third one has taken the free place"
+    assert np.linalg.norm(last[[0, 1, 4], :2] - [3, 10], axis=1).max() < 3.5
 
 
 def test_a_merge_as_a_parent_arrives_keeps_the_places_of_the_new_group(tmp_path):

@@ -37,6 +37,25 @@ def test_groups_that_are_there_from_the_beginning_do_not_start_at_one_place(
             run(load(tmp_path / "scene.toml"), 1)
 
 
+def test_height_and_clothes_of_one_group_change_nothing_else(tmp_path: Path) -> None:
+    (tmp_path / "scene.toml").write_text(SCENE.format(start="[5, 14]"))
+    settings = [
+        "group.a.height={ uniform = [1.1, 1.3] }",
+        "group.a.clothes=['red', '#0102ff']",
+        "group.b.trousers=black",
+    ]
+    any_, own = run(load(tmp_path / "scene.toml"), 1), run(load(tmp_path / "scene.toml", settings), 1)
+    assert np.array_equal(any_.pos, own.pos)
+    assert np.array_equal(any_.height[3:], own.height[3:])
+    assert ((own.height[:3] >= 1.1) & (own.height[:3] <= 1.3)).all()
+    assert len(set(own.height[:3])) == 3
+    red, blue = [0xC0, 0x20, 0x20], [1, 2, 255]
+    assert all(own.clothes[p, 0].tolist() in (red, blue) for p in range(3))
+    assert own.clothes[3:, 1].tolist() == [[0x1A, 0x1A, 0x1C]] * 3
+    assert np.isnan(own.clothes[:3, 1]).all()
+    assert np.isnan(own.clothes[3:, 0]).all()
+
+
 STOPS = [
     ({"stay": 3.0}, (0, 1, 2)), ({"until": (2.0,)}, (0, 1, 2)), ({"stay": 3.0, "members": 3}, (0, 1, 2)),
     ({"stay": 3.0, "members": 0}, None), ({}, None), ({"members": 2}, None),

@@ -204,3 +204,8 @@ def test_a_disk_fills_up_under_two_workers(tmp_path, whole):
 
 def open_all(out: Path) -> list[Path]:
     return [p for p in out.glob("flockscope-train/*/") if not p.name.startswith(".")]
+
+
+def test_suites_with_entries_of_one_name_are_refused_with_a_remedy(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"'pillar' twice.*combine them in a suite"):
+        generate(["standard", "occlusion"], range(1), tmp_path, streams=())

@@ -247,3 +247,19 @@ def test_sky_is_above_the_horizon_and_has_no_disparity() -> None:
     pixels = made.pixels(1, disparity=True)
     assert np.isnan(pixels.disparity[0]).all()
     assert made.frame(1)[0].mean() > made.frame(1)[-1].mean()
+
+
+def test_people_wear_the_colours_that_they_are_given() -> None:
+    """Of the others not a pixel changes."""
+    motion, camera = motion_in(BARE), VIEWS["high"]
+    clothes = np.full((len(motion.height), 2, 3), np.nan)
+    clothes[0] = [[250, 10, 10], [10, 10, 250]]
+    plain, dressed = (Renderer(m, camera, Light(shadow=0.0), SHARP).draw(5, pixels=True) for m in (
+        motion, motion.replace(clothes=clothes)
+    ))  # fmt: skip
+    changed = (plain.image != dressed.image).any(axis=2)
+    assert (dressed.pixels.ids[changed] == 1).all()
+    v, u = np.nonzero(dressed.pixels.ids == 1)
+    upper, lower = (dressed.image[v[rows], u[rows]].astype(float) for rows in (v < np.median(v), v > np.median(v)))
+    assert np.median(upper[:, 2] - upper[:, 0]) > 60, "red"
+    assert np.median(lower[:, 0] - lower[:, 2]) > 60, "blue"

@@ -9,6 +9,7 @@ from sim.types import GroupEvent, Motion, Order, Truth
 from tests.reference_sense import walkers
 
 FRAMES = 150
+MIDDLE = (6.1, 2.0)  # 3.7 m, on average, from the people of `merging` in frame 20
 
 
 def order_of(id: str, kind: str, fired: int | None, before: tuple, after: tuple) -> Order:
@@ -39,19 +40,19 @@ def truth_of(motion: Motion, changes: int, kind: str = "merge", to: tuple[int, .
     frame = np.repeat(np.arange(1, FRAMES + 1), 3)
     person = np.tile([1, 2, 3], FRAMES)
     group = np.where(frame >= changes, np.tile(to, FRAMES), np.tile([1, 1, -1], FRAMES))
-    event = GroupEvent(kind, changes, changes, None, (-1, 1), (1,), (1, 2, 3), (0.0, 0.0))
+    event = GroupEvent(kind, changes, changes, None, (-1, 1), (1,), (1, 2, 3), MIDDLE)
     return Truth(
         "made-up", 10.0, FRAMES, 40.0, frame, person, group, None, None, None, np.ones(len(frame)), events=(event,)
     )
 
 
-@pytest.mark.parametrize("onset", [20, 57, 100])
-def test_fulfilled_from_the_firing_to_ten_seconds_less_the_rule(onset: int) -> None:
+@pytest.mark.parametrize("onset", [20, 57, 100, 136])
+def test_fulfilled_from_the_firing_to_ten_seconds_and_the_way_less_the_rule(onset: int) -> None:
     motion = merging()
     assert check(motion, truth_of(motion, onset)) == {"m1": 0}
 
 
-@pytest.mark.parametrize("onset", [19, 101])
+@pytest.mark.parametrize("onset", [19, 138])
 def test_too_early_and_too_late(onset: int) -> None:
     motion = merging()
     with pytest.raises(WorkError) as caught:
@@ -79,6 +80,22 @@ def test_an_order_that_never_fired() -> None:
         check(merging(None), truth_of(merging(None), 50))
 
 
+def test_the_reason_for_never_firing_is_named() -> None:
+    motion = merging(None).replace(unfired=(("m1", "its groups came within 3.20 m"),))
+    with pytest.raises(WorkError, match=r"never fired: its groups came within 3\.20 m;"):
+        check(motion, truth_of(motion, 50))
+
+
+def test_the_time_for_which_a_merge_fitted_is_named() -> None:
+    motion = merging()
+    vel = motion.vel.copy()
+    vel[60:73] = 0
+    near = motion.pos.copy()
+    near[:, 2] = near[:, 1] + [1.0, 0]
+    with pytest.raises(WorkError, match=r"both fit for 1\.3 s"):
+        check(motion.replace(pos=near, vel=vel), truth_of(motion, 138))
+
+
 def test_splits() -> None:
     order = order_of("s1", "split", 20, ((1, 2),), ((1,), (2,)))
     motion = merging().replace(orders=(order,))
@@ -101,7 +118,12 @@ def test_queues_want_three_of_their_people() -> None:
     pause[30:47] = 0
     with pytest.raises(WorkError, match="at most 3 of 3 "):
         check(motion.replace(vel=pause), fewer)
-    late = truth_of(motion, 91, "queue")  # 3 s of the rule would end later than 10 s after the firing
+    with pytest.raises(WorkError, match=r"a line of 2 people for 1\.7 s"):
+        check(motion.replace(vel=pause), fewer)
+    before = truth.replace(events=(GroupEvent("queue", 11, 90, None, (), (), (1, 2, 3), (0, 0)),))
+    with pytest.raises(WorkError, match=r"the queue in which they stand began before, at 1 s; .* more than 3 s"):
+        check(motion, before)
+    late = truth_of(motion, 128, "queue")  # 3 s of the rule would end later than 10 s and the way after the firing
     with pytest.raises(WorkError):
         check(motion, late)
 

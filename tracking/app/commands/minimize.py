@@ -13,6 +13,7 @@ from scenarios.errors import InputError, counted, printable
 from scenarios.loading.resolve import load, names, resolve
 from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import Scenario
+from sim.draws import drawn
 from sim.sequence import simulate
 from sim.store.atomic import write_file
 from sim.store.own_files import output_file, refuse_foreign_file
@@ -92,7 +93,8 @@ def _scene_and_tracker(options: MinimizeOptions) -> tuple[Scene, TrackerSetup]:
         expected, remedy = "one scene and its tracker, or a run", "give a scenario with --tracker, or a run"
         raise InputError(place="SOURCE", got=got, expected=expected, remedy=remedy)
     find(options.tracker)
-    return Scene(entry.scenario, options.seed or 0, entry.repeat), TrackerSetup(options.tracker)
+    seed = options.seed or 0
+    return Scene(drawn(entry.scenario, seed, entry.repeat), seed, entry.repeat), TrackerSetup(options.tracker)
 
 
 def _of_run(folder: Path) -> tuple[Scene, TrackerSetup]:
