@@ -9,7 +9,6 @@ from sim.types import GroupEvent, Motion, Order, Truth
 from tests.reference_sense import walkers
 
 FRAMES = 150
-MIDDLE = (6.1, 2.0)  # 3.7 m, on average, from the people of `merging` in frame 20
 
 
 def order_of(id: str, kind: str, fired: int | None, before: tuple, after: tuple) -> Order:
@@ -40,19 +39,19 @@ def truth_of(motion: Motion, changes: int, kind: str = "merge", to: tuple[int, .
     frame = np.repeat(np.arange(1, FRAMES + 1), 3)
     person = np.tile([1, 2, 3], FRAMES)
     group = np.where(frame >= changes, np.tile(to, FRAMES), np.tile([1, 1, -1], FRAMES))
-    event = GroupEvent(kind, changes, changes, None, (-1, 1), (1,), (1, 2, 3), MIDDLE)
+    event = GroupEvent(kind, changes, changes, None, (-1, 1), (1,), (1, 2, 3), (0.0, 0.0))
     return Truth(
         "made-up", 10.0, FRAMES, 40.0, frame, person, group, None, None, None, np.ones(len(frame)), events=(event,)
     )
 
 
-@pytest.mark.parametrize("onset", [20, 57, 100, 136])
-def test_fulfilled_from_the_firing_to_ten_seconds_and_the_way_less_the_rule(onset: int) -> None:
+@pytest.mark.parametrize("onset", [20, 57, 100])
+def test_fulfilled_from_the_firing_to_ten_seconds_less_the_rule(onset: int) -> None:
     motion = merging()
     assert check(motion, truth_of(motion, onset)) == {"m1": 0}
 
 
-@pytest.mark.parametrize("onset", [19, 138])
+@pytest.mark.parametrize("onset", [19, 101])
 def test_too_early_and_too_late(onset: int) -> None:
     motion = merging()
     with pytest.raises(WorkError) as caught:
