@@ -110,7 +110,7 @@ class Navigator:
             return straight
         from sim.crowd.wayfinding_kernels import in_sight, sees
 
-        if sees(start[0], start[1], goal[0], goal[1], self.closed, -1, -1):
+        if sees(start[0], start[1], goal[0], goal[1], self.closed, self.first, -1, -1):
             return straight
         if not len(self.nodes):
             return None

@@ -19,7 +19,7 @@ HOLDER, HELD, NEXT = range(3)
 BOTH = 2.0
 FREE = -1  # no gate
 
-TINY = 1e-9  # m²
+BODY, TOUCH = 0.2, 0.01  # m: people walk no nearer past the end of a wall; ends so near are one
 NEAR_GATE = 2.0  # m from a gate: a group goes on in file
 PASSED = 0.35  # m behind a gate: a person has passed it
 AIM_BEYOND, AIM_BEFORE = 0.6, 0.45  # m from a gate: where people walk to who are before its opening, or beside it
@@ -44,24 +44,39 @@ LEAVE_RADIUS = 0.8  # m
 
 
 @njit(cache=True)
-def sees(ax, ay, bx, by, closed, skip, also):  # type: ignore[no-untyped-def]
-    """Returns True if no closed segment but those of indices `skip` and `also` crosses the segment from a to b."""
+def _ends(x, y, closed, k):  # type: ignore[no-untyped-def]
+    """Returns True if (x, y) is an end of the closed segment k; k < 0: False."""
+    if k < 0:
+        return False
+    first = abs(closed[k, 0] - x) + abs(closed[k, 1] - y) < TOUCH
+    return first or abs(closed[k, 2] - x) + abs(closed[k, 3] - y) < TOUCH
+
+
+@njit(cache=True)
+def sees(ax, ay, bx, by, closed, first, skip, also):  # type: ignore[no-untyped-def]
+    """Returns True if a body has room on the segment from a to b: no closed segment but those of indices `skip` and
+    `also` crosses it, and no end of a wall, but at their sides, is nearer than BODY."""
+    ux, uy = bx - ax, by - ay
+    size = ux * ux + uy * uy
     for k in range(len(closed)):
-        if k in (skip, also):
-            continue
         px, py, qx, qy = closed[k, 0], closed[k, 1], closed[k, 2], closed[k, 3]
-        if (max(px, qx) < min(ax, bx)) or (min(px, qx) > max(ax, bx)):
+        if max(px, qx) < min(ax, bx) - BODY or min(px, qx) > max(ax, bx) + BODY or k in (skip, also):
             continue
-        if (max(py, qy) < min(ay, by)) or (min(py, qy) > max(ay, by)):
+        if max(py, qy) < min(ay, by) - BODY or min(py, qy) > max(ay, by) + BODY:
             continue
-        ux, uy = bx - ax, by - ay
         s1, s2 = ux * (py - ay) - uy * (px - ax), ux * (qy - ay) - uy * (qx - ax)
-        if abs(s1) + abs(s2) < TINY:  # along the segment
-            return False
         wx, wy = qx - px, qy - py
         s3, s4 = wx * (ay - py) - wy * (ax - px), wx * (by - py) - wy * (bx - px)
         if s1 * s2 < 0.0 and s3 * s4 < 0.0:
             return False
+        if k < first:
+            along, further = ux * (px - ax) + uy * (py - ay), ux * (qx - ax) + uy * (qy - ay)
+            near = 0.0 < along < size and s1 * s1 < BODY * BODY * size
+            if near and not (_ends(px, py, closed, skip) or _ends(px, py, closed, also)):
+                return False
+            near = 0.0 < further < size and s2 * s2 < BODY * BODY * size
+            if near and not (_ends(qx, qy, closed, skip) or _ends(qx, qy, closed, also)):
+                return False
     return True
 
 
@@ -80,7 +95,9 @@ def in_sight(points, nodes, closed, first):  # type: ignore[no-untyped-def]
     out = np.full((len(points), len(nodes)), np.inf)
     for i in range(len(points)):
         for n in range(len(nodes)):
-            if sees(points[i, 0], points[i, 1], nodes[n, 0], nodes[n, 1], closed, first + n if n < gates else -1, -1):
+            if sees(
+                points[i, 0], points[i, 1], nodes[n, 0], nodes[n, 1], closed, first, first + n if n < gates else -1, -1
+            ):
                 out[i, n] = _apart(nodes[n, 0], nodes[n, 1], points[i, 0], points[i, 1])
     return out
 
@@ -93,7 +110,7 @@ def between(nodes, closed, first):  # type: ignore[no-untyped-def]
     for i in range(n):
         for j in range(i):
             a, b = first + i if i < gates else -1, first + j if j < gates else -1
-            if sees(nodes[i, 0], nodes[i, 1], nodes[j, 0], nodes[j, 1], closed, a, b):
+            if sees(nodes[i, 0], nodes[i, 1], nodes[j, 0], nodes[j, 1], closed, first, a, b):
                 out[i, j] = _apart(nodes[i, 0], nodes[i, 1], nodes[j, 0], nodes[j, 1])
                 out[j, i] = out[i, j]
     return out
@@ -110,7 +127,7 @@ def first_hop(x, y, tx, ty, gate, nodes, far, closed, first):  # type: ignore[no
     own = first + gate if gate >= 0 else -1
     for n in range(len(nodes)):
         through = first + n if n < gates else -1
-        if not sees(x, y, nodes[n, 0], nodes[n, 1], closed, through, -1):
+        if not sees(x, y, nodes[n, 0], nodes[n, 1], closed, first, through, -1):
             continue
         here = _apart(nodes[n, 0], nodes[n, 1], x, y)
         if here >= best:
@@ -123,7 +140,9 @@ def first_hop(x, y, tx, ty, gate, nodes, far, closed, first):  # type: ignore[no
                 best, found = whole, n
                 continue
             whole += _apart(nodes[m, 0], nodes[m, 1], tx, ty)
-            if whole < best and sees(tx, ty, nodes[m, 0], nodes[m, 1], closed, first + m if m < gates else -1, own):
+            if whole < best and sees(
+                tx, ty, nodes[m, 0], nodes[m, 1], closed, first, first + m if m < gates else -1, own
+            ):
                 best, found = whole, n
     return found
 
@@ -243,7 +262,7 @@ def _near(gates, k, x, y, reach):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def _sees_point(x, y, point, k, closed, first):  # type: ignore[no-untyped-def]
     """Returns True if a point (2,) of a way, in the middle of gate k or of none (FREE), is seen from (x, y)."""
-    return sees(x, y, point[X], point[Y], closed, first + k if k >= 0 else -1, -1)
+    return sees(x, y, point[X], point[Y], closed, first, first + k if k >= 0 else -1, -1)
 
 
 @njit(cache=True)
@@ -391,7 +410,7 @@ def find_ways(  # type: ignore[no-untyped-def]
             tx, ty, k = route[g, w, X], route[g, w, Y], gate[g, w]
         else:
             continue
-        if not sees(x, y, tx, ty, closed, first + k if k >= 0 else -1, -1):
+        if not sees(x, y, tx, ty, closed, first, first + k if k >= 0 else -1, -1):
             n = first_hop(x, y, tx, ty, k, nodes, far, closed, first)
             if n >= 0:
                 alone[i] = lost[i] = True
