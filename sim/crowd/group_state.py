@@ -27,13 +27,13 @@ class GroupState:
     State: alive: index of each existing group by name; arrays: the ways of groups, as the kernels use them; next_group:
     index of the next new group; settled: indices of groups that stand in a circle. By group index, also for groups that
     ended: members (columns), spacing (m), goals (point and "stand", "leave" or "walk"); gate (G, W): the gate that each
-    waypoint lies in, -1 for none. everybody: all people, by column, as the kernels use those who are present; its
-    columns are also places (in the formation, m), group_of (group index), mode and queue_of (index of the queue order,
-    -1 in no queue). Also by column: targets (place in the queue, or where a held person stands, m); held: True for a
-    person who stays behind at a stop; alone: True for a person who walks alone, at `share` of the speed, to the point
-    `aims`, m; waypoint (the first one not passed); apart: of people who have lost the group, the first column of those
-    with whom they walk, else -1; gone: True for a person who has come to the end of the way alone, and leaves; present;
-    free_speed (m/s).
+    waypoint lies in, -1 for none; beyond (G, W): the side of it to which the way leads, 1.0 for its left, or -1.0.
+    everybody: all people, by column, as the kernels use those who are present; its columns are also places (in the
+    formation, m), group_of (group index), mode and queue_of (index of the queue order, -1 in no queue). Also by column:
+    targets (place in the queue, or where a held person stands, m); held: True for a person who stays behind at a stop;
+    alone: True for a person who walks alone, at `share` of the speed, to the point `aims`, m; waypoint (the first one
+    not passed); apart: of people who have lost the group, the first column of those with whom they walk, else -1; gone:
+    True for a person who has come to the end of the way alone, and leaves; present; free_speed (m/s).
     """
 
     def __init__(self, entering: list[EnteringGroup], new: int, navigator: Navigator, slowdown: float) -> None:
@@ -57,7 +57,7 @@ class GroupState:
         )
         self.alone, self.gone = np.zeros(len(people), np.bool_), np.zeros(len(people), np.bool_)
         self.waypoint, self.apart = np.zeros(len(people), np.int64), np.full(len(people), -1)
-        self.gate = np.full(self.arrays.kind.shape, -1)
+        self.gate, self.beyond = np.full(self.arrays.kind.shape, -1), np.zeros(self.arrays.kind.shape)
         for index, columns in self.members.items():
             self.group_of[columns] = index
         self.held = np.zeros(len(people), np.bool_)
@@ -123,6 +123,10 @@ class GroupState:
         way[-1] = (way[-1][0], END)
         self.write_way(g, way, finish, speed, start)
         self.gate[g, : len(gates)] = gates
+        passing = [start, *(point for point, _ in way)]
+        for k, passed in enumerate(gates):
+            if passed >= 0:
+                self.beyond[g, k] = self.navigator.beyond(passed, passing[k], passing[min(k + 2, len(way))])
 
     def ahead(self, g: int) -> list[Array]:
         """Returns the points (2,) m that a group has yet to pass, without doors and the end of its way."""
@@ -143,6 +147,7 @@ class GroupState:
         self.arrays = arrays = self.arrays.with_room(len(way))
         room = (0, arrays.kind[0].size - self.gate[0].size)
         self.gate = np.pad(self.gate, ((0, 0), room), constant_values=-1)
+        self.beyond = np.pad(self.beyond, ((0, 0), room))
         self.gate[g] = -1
         for k, (point, kind) in enumerate(way):
             arrays.route[g, k], arrays.kind[g, k] = point, kind

@@ -99,6 +99,16 @@ class Navigator:
                             found.append(wall[a] + CLEARANCE * away / length(away))
         return np.array(found).reshape(-1, 2)
 
+    def beyond(self, gate: int, before: Array, after: Array) -> float:
+        """Returns the side of a gate to which a way leads from the point before it: 1.0 for its left, or -1.0.
+
+        before, after (2,): m. The point after it counts where that before lies on the gate's own line.
+        """
+        a, b = self.gates[gate]
+        along = (b - a) / length(b - a)
+        here, there = (float(along[0] * (p - a)[1] - along[1] * (p - a)[0]) for p in (before, after))
+        return 1.0 if (there if abs(here) < TOUCH else -here) > 0 else -1.0
+
     def way(self, start: Array, goal: Array) -> tuple[Array, Ints] | None:
         """Returns the points (K, 2) m to walk to, the goal last, and for each the gate that it lies in, -1 for none.
 

@@ -308,13 +308,12 @@ def _start_files(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _passes(x, y, g, w, route, gate, closed, first):  # type: ignore[no-untyped-def]
+def _passes(x, y, g, w, route, gate, beyond, closed, first):  # type: ignore[no-untyped-def]
     """Returns True if a person at (x, y) has passed point w of the way of group g, which is not its last."""
     k = gate[g, w]
     if k >= 0:
         along, across, width = _across(closed[first:], k, x, y)
-        _, beyond, _ = _across(closed[first:], k, route[g, w + 1, X], route[g, w + 1, Y])
-        return across * (1.0 if beyond > 0.0 else -1.0) > PASSED and abs(along) < 0.5 * width + BESIDE
+        return across * beyond[g, w] > PASSED and abs(along) < 0.5 * width + BESIDE
     dx, dy = route[g, w, X] - x, route[g, w, Y] - y
     d2 = dx * dx + dy * dy
     if d2 <= NEAR_POINT * NEAR_POINT:
@@ -372,13 +371,14 @@ def _share_of_waiting(i, state, walks, group_of, waypoint, route, gates):  # typ
 @njit(cache=True)
 def find_ways(  # type: ignore[no-untyped-def]
     t, state, there, waits, group_of, target, waypoint, alone, aim, share, gone,
-    route, kind, gate, length, current, filing, since, finish,
+    route, kind, gate, beyond, length, current, filing, since, finish,
     nodes, far, closed, first, gate_state, dt, wait_time,
 ):  # fmt: skip
     """Decides at time t (s) how all people walk for the next dt s.
 
     state (P, 4), m, m/s; there (P,): who is present. waits (P,): True for people who walk to `target` (P, 2), m, and
-    stand there. wait_time: s for which a group in file waits for its last. Returns whether somebody walks alone, or did
+    stand there. beyond (G, W): side of the gate to which a way leads, 1.0 for its left,
+    or -1.0. wait_time: s for which a group in file waits for its last. Returns whether somebody walks alone, or did
     before, and whether a group has waited so long. Overwritten: alone (P,), and for those who
     walk alone aim (P, 2), m, and share (P,) of the speed; gone (P,): True for who has come to the end of the way alone
     and leaves. Updated: waypoint (P,), filing (G,), since (G,), s, current (G,), gate_state (K, 3).
@@ -392,7 +392,7 @@ def find_ways(  # type: ignore[no-untyped-def]
     for i in range(people):
         g = group_of[i]
         while walks[i] and filing[g] and waypoint[i] < length[g] - 1:
-            if not _passes(state[i, X], state[i, Y], g, waypoint[i], route, gate, closed, first):
+            if not _passes(state[i, X], state[i, Y], g, waypoint[i], route, gate, beyond, closed, first):
                 break
             waypoint[i] += 1
     _end_files(state, walks, group_of, count, middle, waypoint, route, gate, current, filing, closed, first)
@@ -420,8 +420,7 @@ def find_ways(  # type: ignore[no-untyped-def]
             wants[i] = k
             _, across, _ = _across(gates, k, x, y)
             if not lost[i] and waypoint[i] < length[g] - 1:  # also for who stands behind the gate already
-                _, beyond, _ = _across(gates, k, route[g, waypoint[i] + 1, X], route[g, waypoint[i] + 1, Y])
-                across = -beyond
+                across = -beyond[g, waypoint[i]]
             side[i] = 1.0 if across > 0.0 else -1.0
     late = False
     for g in range(len(length)):

@@ -131,3 +131,13 @@ def test_a_queue_behind_a_door_is_reached_from_afar_and_a_merge_too() -> None:
     end = motion.measured.pos[-1]
     assert (end[:, 0] > 10).all()
     assert [e.kind for e in label(motion, None).events] == ["merge"]
+
+
+def test_a_way_through_two_doors_of_one_wall() -> None:
+    """The second door lies on the line of the first, so that it shows no side to which the way leads."""
+    walls = [[10, 0, 10, 12], [2, 6, 10, 6], [10, 6, 18, 6]]
+    world = {"size": [20, 12], "walls": walls, "doors": [{"at": [10, 3], "width": 1}, {"at": [10, 9], "width": 1}]}
+    group = {"id": "a", "size": 2, "start": [8.5, 3], "goal": [8, 9], "at_goal": "leave", "repeat": 1}
+    closed = {**world, "walls": [*walls, [0, 6, 2, 6]]}
+    motion, _ = played(0, world=closed, group=[group])
+    assert left_at_the_end(motion) == 0
