@@ -49,8 +49,8 @@ class Wayfinding:
         changed, late = find_ways(
             t, state, groups.present, waits, groups.group_of, groups.targets, groups.waypoint, groups.alone,
             groups.aims, groups.share, groups.gone, arrays.route, arrays.kind, groups.gate, groups.beyond,
-            arrays.length, arrays.current, arrays.filing, self.since, arrays.finish, navigator.nodes, navigator.far, navigator.closed,
-            navigator.first, self.gate_state, 1 / SCRIPT_RATE, WAIT_TIME,
+            arrays.length, arrays.current, arrays.filing, self.since, arrays.finish, navigator.nodes, navigator.far,
+            navigator.closed, navigator.first, self.gate_state, 1 / SCRIPT_RATE, WAIT_TIME,
         )  # fmt: skip
         if late or self.parted:
             self._part_the_lost(t, state)
