@@ -158,5 +158,5 @@ def closest(order: Order, s: States, window: slice) -> str:
     difference = found.velocity_difference[k]
     held = found.merge_rule() if order.kind == "merge" else found.split_rule()
     time = longest_time(held, s.rate)
-    words = f"the first part {word} {gap[k]:.2f} m from the others, velocities then differing by {difference:.2f} m/s"
+    words = f"parts {word} {gap[k]:.2f} m apart, velocities then differing by {difference:.2f} m/s"
     return f"{words}; both fit for {time:g} s at most"

@@ -60,7 +60,7 @@ def test_too_early_and_too_late(onset: int) -> None:
     assert "m1" in caught.value.place
     assert "seed 7" in caught.value.place
     assert "within 10 s" in caught.value.expected
-    assert "fired at 1.9 s and had not come true at 11.9 s: the first part nearest" in caught.value.got
+    assert "fired at 1.9 s and had not come true at 11.9 s: parts nearest" in caught.value.got
     assert "1.5 m" in caught.value.expected
 
 
