@@ -50,11 +50,8 @@ class GroupState:
         self.everybody = PeopleArrays.empty(len(people))
         self.places = self.everybody.place
         self.group_of, self.mode, self.queue_of = self.everybody.tag.T
-        self.targets, self.aims, self.share = (
-            np.zeros((len(people), 2)),
-            np.zeros((len(people), 2)),
-            np.ones(len(people)),
-        )
+        self.targets, self.aims = np.zeros((2, len(people), 2))
+        self.share = np.ones(len(people))
         self.alone, self.gone = np.zeros(len(people), np.bool_), np.zeros(len(people), np.bool_)
         self.waypoint, self.apart = np.zeros(len(people), np.int64), np.full(len(people), -1)
         self.gate, self.beyond = np.full(self.arrays.kind.shape, -1), np.zeros(self.arrays.kind.shape)
@@ -145,9 +142,9 @@ class GroupState:
         the group's position in m, from which the group turns to its first waypoint.
         """
         self.arrays = arrays = self.arrays.with_room(len(way))
-        room = (0, arrays.kind[0].size - self.gate[0].size)
-        self.gate = np.pad(self.gate, ((0, 0), room), constant_values=-1)
-        self.beyond = np.pad(self.beyond, ((0, 0), room))
+        if room := arrays.kind[0].size - self.gate[0].size:
+            self.gate = np.pad(self.gate, ((0, 0), (0, room)), constant_values=-1)
+            self.beyond = np.pad(self.beyond, ((0, 0), (0, room)))
         self.gate[g] = -1
         for k, (point, kind) in enumerate(way):
             arrays.route[g, k], arrays.kind[g, k] = point, kind

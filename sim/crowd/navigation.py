@@ -53,27 +53,27 @@ class Navigator:
     def _gaps(self, doors: Array) -> Array:
         """Returns the narrow gaps (K, 2, 2) between the end of a wall and another one or the border, without doors."""
         found: list[Array] = []
-        (x, y), o = self.size, 0.0
-        border = np.array([[[o, o], [x, o]], [[x, o], [x, y]], [[x, y], [o, y]], [[o, y], [o, o]]])
-        solid = np.concatenate([self.walls, border])
-        for k, wall in enumerate(self.walls):
-            for end in wall:
-                for other in np.delete(solid, k, axis=0):
-                    along, off = other[1] - other[0], end - other[0]
-                    foot = other[0] + np.clip(dot(off, along) / max(float(dot(along, along)), 1e-12), 0, 1) * along
-                    gap, middle = np.stack([end, foot]), (end + foot) / 2
-                    if not LEAST_GAP < float(length(end - foot)) < NARROW_GAP:
-                        continue
-                    near = [*doors.mean(axis=1), *(g.mean(axis=0) for g in found)]
-                    if any(float(length(middle - m)) < NARROW_GAP / 2 for m in near):
-                        continue
-                    a, b = (gap + 1e-6 * (gap[::-1] - gap))[:, None]
-                    if blocked(a, b, self.walls).any():
-                        continue
-                    across = np.array([foot[1] - end[1], end[0] - foot[0]]) / length(foot - end)
-                    sides = middle + CLEARANCE * np.stack([across, 0 * across, -across])
-                    if (wall_distances(sides[:, None], solid) > LEAST_GAP / 2.1).all():  # no corner, nor a wall
-                        found.append(gap)
+        x, y = self.size.tolist()
+        corners = np.array([[0.0, 0.0], [x, 0.0], [x, y], [0.0, y]])
+        solid = np.concatenate([self.walls, np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)])
+        near_by = wall_distances(self.walls[:, :, None], solid) < NARROW_GAP + TOUCH
+        for k, which, o in np.argwhere(near_by).tolist():
+            end, other = self.walls[k, which], solid[o]
+            along, off = other[1] - other[0], end - other[0]
+            foot = other[0] + np.clip(dot(off, along) / max(float(dot(along, along)), 1e-12), 0, 1) * along
+            gap, middle = np.stack([end, foot]), (end + foot) / 2
+            if k == o or not LEAST_GAP < float(length(end - foot)) < NARROW_GAP:
+                continue
+            near = [*doors.mean(axis=1), *(g.mean(axis=0) for g in found)]
+            if any(float(length(middle - m)) < NARROW_GAP / 2 for m in near):
+                continue
+            a, b = (gap + 1e-6 * (gap[::-1] - gap))[:, None]
+            if blocked(a, b, self.walls).any():
+                continue
+            across = np.array([foot[1] - end[1], end[0] - foot[0]]) / length(foot - end)
+            sides = middle + CLEARANCE * np.stack([across, 0 * across, -across])
+            if (wall_distances(sides[:, None], solid) > LEAST_GAP / 2.1).all():  # no corner, nor a wall
+                found.append(gap)
         return np.array(found).reshape(-1, 2, 2)
 
     def _wall_ends(self) -> Array:
@@ -90,13 +90,13 @@ class Navigator:
     def _joints(self) -> Array:
         """Returns points (J, 2) outside the corners at which two walls meet, on the line that halves the angle."""
         found = []
-        for k, wall in enumerate(self.walls):
-            for other in self.walls[:k]:
-                for a, b in ((0, 0), (0, 1), (1, 0), (1, 1)):
-                    if float(length(wall[a] - other[b])) < TOUCH:
-                        away = sum((w[e] - w[1 - e]) / length(w[e] - w[1 - e]) for w, e in ((wall, a), (other, b)))
-                        if float(length(away)) > TOUCH:
-                            found.append(wall[a] + CLEARANCE * away / length(away))
+        ends = self.walls[:, None, :, None] - self.walls[None, :, None, :]
+        for k, o, a, b in np.argwhere(length(ends) < TOUCH).tolist():
+            if o < k:
+                wall, other = self.walls[k], self.walls[o]
+                away = sum((w[e] - w[1 - e]) / length(w[e] - w[1 - e]) for w, e in ((wall, a), (other, b)))
+                if float(length(away)) > TOUCH:
+                    found.append(wall[a] + CLEARANCE * away / length(away))
         return np.array(found).reshape(-1, 2)
 
     def beyond(self, gate: int, before: Array, after: Array) -> float:

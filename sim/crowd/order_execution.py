@@ -284,7 +284,7 @@ class OrderExecution:
                 elif isinstance(pending.order, SplitOrder):
                     self._split(pending, pending.order, state)
                 else:
-                    self._line_up(pending, pending.order, state)
+                    self._line_up(pending, pending.order)
             elif pending.fired is not None and pending.true_at is None and pending.order.id in self.awaited:
                 pending.watch(t, state)
                 if pending.true_at is not None:
@@ -350,7 +350,7 @@ class OrderExecution:
             groups.arrays.heading[g] = groups.arrays.heading[parent]
         pending.after = tuple(after)
 
-    def _line_up(self, pending: PendingOrder, order: QueueOrder, state: Array) -> None:
+    def _line_up(self, pending: PendingOrder, order: QueueOrder) -> None:
         groups = self.groups
         queuing = [groups.alive[n] for n in concerned(order, list(groups.alive))]
         for queue in self.queues.values():

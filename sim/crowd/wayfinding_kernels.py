@@ -222,7 +222,7 @@ def _take_turns(gates, state, wants, side, gate_state, dt):  # type: ignore[no-u
         along, across, width = _across(gates, k, state[i, X], state[i, Y])
         d = sqrt(along * along + across * across)
         s = 1 if side[i] > 0.0 else 0
-        if abs(along) < 0.5 * width and (across * side[i] < 0.35):
+        if abs(along) < 0.5 * width and across * side[i] < PASSED:
             inside[k] += 1
         if d < DEMAND:
             waiting[k, s] += 1

@@ -100,11 +100,12 @@ class World:
         frames = FrameTimes.of(max(1, round(duration * fps)), fps)
         people, needed = len(self.members), count if self.between is None else max(count, int(frames.tick[-1]) + 2)
         states, intents = np.empty((needed, people, 4)), np.empty((needed, people), np.int64)
-        free = np.empty((needed, people), np.bool_)
+        free = np.ones((needed, people), np.bool_)
         shown = states[: len(frames.tick)] if self.between is None else np.empty((len(frames.tick), people, 4))
         for tick, (state, group) in enumerate(self.ticks(needed)):
             states[tick], intents[tick] = state, group
-            free[tick] = free[tick - 1] if tick % SCRIPT_RATE else self._free_to_walk()  # looked at once a second
+            if not tick % SCRIPT_RATE:  # `immobile_people` looks once a second
+                free[tick] = self._free_to_walk()
             if tick and self.between is not None:  # what lies between two ticks is known at the second one
                 shown[frames.within(tick - 1)] = frames.states(tick - 1, self.between)
         lost = tuple(self._never_arrive(states[:count]))

@@ -2,8 +2,8 @@
 
 Merged: nearest members less than 1.5 m apart, mean velocities differing by less than 0.5 m/s. Split: more than 2.5 m
 apart, or 1.5 m with velocities differing by more than 0.7 m/s. Both must hold for 2 s. Where a wall is between two
-people, their distance is that of walking round it. `separation` measures two parts
-over time; its methods apply the rules frame by frame; `holds_for` finds the frames from which a rule holds long enough.
+people, their distance is that of walking round it. `separation` measures two parts over time; its methods apply the
+rules frame by frame; `holds_for` finds the frames from which a rule holds long enough.
 """
 
 from __future__ import annotations

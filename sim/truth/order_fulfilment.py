@@ -2,8 +2,7 @@
 
 An order (merge, split or queue) is fulfilled by a measured event of its kind, with the right people, that starts no
 earlier than the order fired. The event's rule must have held for its whole time (2 s; queues 3 s) within PATIENCE (10
-s) of the firing.
-Orders are carried out by sim.crowd.order_execution.
+s) of the firing. Orders are carried out by sim.crowd.order_execution.
 """
 
 from __future__ import annotations
@@ -62,11 +61,9 @@ def fulfilment(order: Order, events: Sequence[GroupEvent], group: Ints, s: State
     if order.time is None:
         return None
     first = _fired(order, s) + 1
-    patience = PATIENCE - RULE_TIME[order.kind]
+    last = first + (PATIENCE - RULE_TIME[order.kind]) * s.rate
     for k, event in enumerate(events):
-        late = event.start - first
-        concerns = event.kind in KINDS[order.kind] and late >= 0 and _concerns(event, order, group)
-        if concerns and late <= patience * s.rate:
+        if event.kind in KINDS[order.kind] and first <= event.start <= last and _concerns(event, order, group):
             return k
     return None
 
