@@ -36,8 +36,19 @@ HALF_WALL = 0.02  # m, as in ours
 LOOK = 0.4  # s between two looks at who stands still
 
 
+def agent_of(model, ways, person):
+    """Returns a person as an agent. ways: stage and journey of each goal."""
+    _, parameters, speed = MODELS[model]
+    stage, journey = ways[tuple(person["goal"])]
+    agent = parameters(journey_id=journey, stage_id=stage, position=tuple(person["start"]))
+    setattr(agent, speed, person["speed"])
+    if hasattr(agent, "radius"):
+        agent.radius = 0.2
+    return agent
+
+
 def played(given, plan):
-    model, parameters, speed = MODELS[given["model"]]
+    model = MODELS[given["model"]][0]
     parts = [shapely.LineString([w[:2], w[2:]]).buffer(HALF_WALL, cap_style="flat") for w in plan["walls"]]
     parts += [shapely.Point(x, y).buffer(r, 6) for x, y, r in plan["pillars"]]
     ground = shapely.box(0, 0, *plan["size"]).difference(unary_union(parts))
@@ -57,13 +68,8 @@ def played(given, plan):
             if person["enter"] > now:
                 waiting.append(person)
                 continue
-            stage, journey = ways[tuple(person["goal"])]
-            agent = parameters(journey_id=journey, stage_id=stage, position=tuple(person["start"]))
-            setattr(agent, speed, person["speed"])
-            if hasattr(agent, "radius"):
-                agent.radius = 0.2
             try:
-                still[simulation.add_agent(agent)] = 0.0
+                still[simulation.add_agent(agent_of(given["model"], ways, person))] = 0.0
             except RuntimeError:
                 waiting.append(person)
         coming = waiting

@@ -14,7 +14,7 @@ import sys
 import jupedsim as jps
 import numpy as np
 import shapely
-from run_floor_plans import HALF_WALL, MODELS
+from run_floor_plans import HALF_WALL, MODELS, agent_of
 
 
 def ground_of(plan):
@@ -25,7 +25,7 @@ def ground_of(plan):
 
 
 def paths(given, plan):
-    model, parameters, speed = MODELS[given["model"]]
+    model = MODELS[given["model"]][0]
     simulation = jps.Simulation(model=model(), geometry=ground_of(plan), dt=given["dt"])
     ways, numbers, coming = {}, {}, dict(enumerate(plan["people"]))
     for x, y in {tuple(person["goal"]) for person in plan["people"]}:
@@ -35,13 +35,8 @@ def paths(given, plan):
     for tick, here in enumerate(found):
         for number, person in list(coming.items()):
             if person["enter"] <= tick / given["rate"]:
-                stage, journey = ways[tuple(person["goal"])]
-                agent = parameters(journey_id=journey, stage_id=stage, position=tuple(person["start"]))
-                setattr(agent, speed, person["speed"])
-                if hasattr(agent, "radius"):
-                    agent.radius = 0.2
                 try:
-                    numbers[simulation.add_agent(agent)] = number
+                    numbers[simulation.add_agent(agent_of(given["model"], ways, person))] = number
                     del coming[number]
                 except RuntimeError:
                     continue
