@@ -19,7 +19,7 @@ from sim.elementary_kernels import exp, sort_by
 from sim.crowd.forces import (
     AVOID_GROUP, AVOID_MAX, AVOID_PERSON, AVOID_TIME, AVOIDED, COUNT, GROUP, GROUP_RANGE, IN_GROUP,
     MAX_ACCELERATION, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y, MODE, PERSON_RADIUS, PERSON_RANGE, PILLAR_RADIUS,
-    PILLAR_X, PILLAR_Y, QUEUE, RADIUS, SEPARATION, SEPARATION_RANGE, SHOVE, VX, VY, WALL, WALL_RANGE, X1, X2,
+    PILLAR_X, PILLAR_Y, QUEUE, RADIUS, ROOM_AHEAD, SEPARATION, SEPARATION_RANGE, SHOVE, SLOWING, VX, VY, WALL, WALL_RANGE, X1, X2,
     Y1, Y2, X, Y,
 )
 # fmt: on
@@ -31,6 +31,9 @@ BRUTE = 48  # people, up to which all pairs are tried
 TINY = 1e-9  # m
 QUEUE_SEPARATION_RANGE = 0.5  # m: members of one queue repel each other up to this distance
 WALL_REACH, PILLAR_REACH = 1.2, 6.0  # m from a wall, from the edge of a pillar: no force beyond
+SLOW = 0.6  # m/s
+USUAL_SPEED = 1.34
+HEADWAY = 0.2
 BODY = 0.2  # m: distance from a wall or a pillar's edge at contact
 PILLAR_MARGIN = 1.2  # person radii that are added to a pillar's radius in the power law
 
@@ -121,6 +124,19 @@ def _avoid_groups(status, push, by_x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _slow_down(state, i, j, dx, dy, d, out):  # type: ignore[no-untyped-def]
+    """Adds to out (N, 2) what slows person i down for the stranger at distance d in the direction -(dx, dy): less room
+    ahead than ROOM_AHEAD. It acts against the velocity, and fades below SLOW."""
+    vx, vy = state[i, VX], state[i, VY]
+    towards = -(vx * dx + vy * dy)
+    if towards > 0.0:
+        away = max(0.0, -(state[j, VX] * dx + state[j, VY] * dy) / d)
+        f = SLOWING * max(0.0, ROOM_AHEAD - d - HEADWAY * away) / d * towards / max(vx * vx + vy * vy, SLOW * SLOW)
+        out[i, X] -= f * vx
+        out[i, Y] -= f * vy
+
+
+@njit(cache=True)
 def _pair(state, tag, i, j, dx, dy, d2, out):  # type: ignore[no-untyped-def]
     """Adds the forces between persons i and j to out (N, 2); (dx, dy) = position i - position j, d2 its square."""
     strength, reach, strangers = SHOVE, 2.0 * PERSON_RADIUS, False
@@ -130,8 +146,11 @@ def _pair(state, tag, i, j, dx, dy, d2, out):  # type: ignore[no-untyped-def]
         strength, reach = SEPARATION, QUEUE_SEPARATION_RANGE
     else:
         strangers = True
-    if d2 < reach * reach:
-        d = max(sqrt(d2), TINY)
+    d = max(sqrt(d2), TINY)
+    if strangers and d < ROOM_AHEAD:
+        _slow_down(state, i, j, dx, dy, d, out)
+        _slow_down(state, j, i, -dx, -dy, d, out)
+    if d < reach:
         f = strength * (1.0 - d / reach) / d
         fx, fy = f * dx, f * dy
     elif strangers:
@@ -181,7 +200,7 @@ def _pairs(state, tag, out):  # type: ignore[no-untyped-def]
     """Adds the forces between people closer than PERSON_RANGE to out (N, 2), each pair once."""
     n = len(state)
     order, start, nx = _cells(state, PERSON_RANGE)
-    touch = max(SEPARATION_RANGE, QUEUE_SEPARATION_RANGE, 2.0 * PERSON_RADIUS)
+    touch = max(SEPARATION_RANGE, QUEUE_SEPARATION_RANGE, ROOM_AHEAD)
     reach, touch, rows = PERSON_RANGE * PERSON_RANGE, touch * touch, np.zeros((5, n))
     for s in range(n):
         for k in range(4):
@@ -204,10 +223,12 @@ def _pairs(state, tag, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _walls(state, walls, pillars, out):  # type: ignore[no-untyped-def]
+def _walls(state, wanted, walls, pillars, out):  # type: ignore[no-untyped-def]
     """Adds the forces of walls within WALL_REACH and pillars within PILLAR_REACH to out (N, 2)."""
     for i in range(len(state)):
         x, y = state[i, X], state[i, Y]
+        pace = sqrt(wanted[i, X] * wanted[i, X] + wanted[i, Y] * wanted[i, Y])
+        strength = WALL * min(1.0, max(pace, SLOW) / USUAL_SPEED)  # else the slow are stuck in narrow doors
         for k in range(len(walls)):
             ax, ay = walls[k, X1], walls[k, Y1]
             ux, uy = walls[k, X2] - ax, walls[k, Y2] - ay
@@ -219,7 +240,7 @@ def _walls(state, walls, pillars, out):  # type: ignore[no-untyped-def]
             dx, dy = x - ax - s * ux, y - ay - s * uy
             d = max(sqrt(dx * dx + dy * dy), TINY)
             if d < WALL_REACH:
-                f = WALL * exp(-(d - BODY) / WALL_RANGE) / d
+                f = strength * exp(-(d - BODY) / WALL_RANGE) / d
                 out[i, X] += f * dx
                 out[i, Y] += f * dy
         for k in range(len(pillars)):
@@ -227,7 +248,7 @@ def _walls(state, walls, pillars, out):  # type: ignore[no-untyped-def]
             r = pillars[k, PILLAR_RADIUS]
             d = max(sqrt(dx * dx + dy * dy), TINY)
             if d < r + PILLAR_REACH:
-                f = WALL * exp(-(d - BODY - r) / WALL_RANGE) / d
+                f = strength * exp(-(d - BODY - r) / WALL_RANGE) / d
                 wide = r + PILLAR_MARGIN * PERSON_RADIUS
                 vx, vy = state[i, VX], state[i, VY]
                 fx, fy = _power_law(dx, dy, vx, vy, wide, AVOID_PERSON)
@@ -236,7 +257,7 @@ def _walls(state, walls, pillars, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def avoid(state, tag, status, push, by_x, walls, pillars, out):  # type: ignore[no-untyped-def]
+def avoid(state, wanted, tag, status, push, by_x, walls, pillars, out):  # type: ignore[no-untyped-def]
     """Adds all avoidance accelerations to out (N, 2), and cuts each sum to MAX_ACCELERATION.
 
     state (N, 4), tag (N, 4), status (G, 12), push (G, 2), by_x (G,), walls (W, 4), pillars (P, 3): as in `forces`.
@@ -245,7 +266,7 @@ def avoid(state, tag, status, push, by_x, walls, pillars, out):  # type: ignore[
     _avoid_groups(status, push, by_x)
     _pairs(state, tag, out)
     if walls is not None:
-        _walls(state, walls, pillars, out)
+        _walls(state, wanted, walls, pillars, out)
     for i in range(len(state)):
         # People in a queue do not take part in the avoidance of their group as a whole.
         if tag[i, MODE] == IN_GROUP:

@@ -179,7 +179,9 @@ def _seek(  # type: ignore[no-untyped-def]
         x, y, vx, vy = state[i, X], state[i, Y], state[i, VX], state[i, VY]
         w = current[g]
         goal = kind[g, w]
-        align = 0.0
+        align, on_stairs = 0.0, 1.0
+        if stairs is not None:
+            on_stairs = _pace_on_stairs(x, y, stairs)
         if tag[i, MODE] == TO_TARGET:
             limit = pace[i]
             tx, ty = (target[i, 0] - x) / TARGET_TIME, (target[i, 1] - y) / TARGET_TIME
@@ -203,12 +205,11 @@ def _seek(  # type: ignore[no-untyped-def]
                 ty = (route[g, w, 1] + oy - y) / GATHER_TIME
             else:
                 limit = speed[g] * (1.0 + HASTE)
-                tx = status[g, WANTED_VX] + (status[g, MEAN_X] + ox - x) / COHESION_TIME
-                ty = status[g, WANTED_VY] + (status[g, MEAN_Y] + oy - y) / COHESION_TIME
+                tx = on_stairs * status[g, WANTED_VX] + (status[g, MEAN_X] + ox - x) / COHESION_TIME
+                ty = on_stairs * status[g, WANTED_VY] + (status[g, MEAN_Y] + oy - y) / COHESION_TIME
                 if status[g, COUNT] > 1.0:
                     align = ALIGNMENT
-        if stairs is not None:
-            limit *= _pace_on_stairs(x, y, stairs)
+        limit *= on_stairs
         size = sqrt(tx * tx + ty * ty)
         if size > limit:
             tx, ty = tx * limit / size, ty * limit / size
@@ -269,5 +270,5 @@ def accelerate(  # type: ignore[no-untyped-def]
     )  # fmt: skip
     _mark_avoided(filing, status)
     _sway(wanted, gait, dt, out)
-    avoid(calm, tag, status, push, by_x, walls, pillars, out)
+    avoid(calm, wanted, tag, status, push, by_x, walls, pillars, out)
     return True
