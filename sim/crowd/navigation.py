@@ -110,7 +110,8 @@ class Navigator:
         return 1.0 if (there if abs(here) < TOUCH else -here) > 0 else -1.0
 
     def way(self, start: Array, goal: Array) -> tuple[Array, Ints] | None:
-        """Returns the points (K, 2) m to walk to, the goal last, and for each the gate that it lies in, -1 for none.
+        """Returns the points (K, 2) m to walk to, the goal last, and for each the gate that it lies in, -2 for none, -1
+        for the goal.
 
         start, goal (2,): m. None if there is no way.
         """
@@ -134,5 +135,5 @@ class Navigator:
             path.append(int(self._before[n, path[-1]]))
         nodes = np.array(path[::-1])
         return np.concatenate([self.nodes[nodes], ends[1:]]), np.append(
-            np.where(nodes < len(self.gates), nodes, -1), -1
+            np.where(nodes < len(self.gates), nodes, -2), -1
         )

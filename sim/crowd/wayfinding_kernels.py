@@ -17,7 +17,7 @@ from sim.crowd.forces import END, GATHER, LEAVE, X, Y
 # decided; side that comes next
 HOLDER, HELD, NEXT = range(3)
 BOTH = 2.0
-FREE = -1  # no gate
+FREE, CORNER = -1, -2  # no gate, but a point of the scenario's, or one round the end of a wall
 
 BODY, TOUCH = 0.2, 0.01  # m: people walk no nearer past the end of a wall; ends so near are one
 NEAR_GATE = 2.0  # m from a gate: a group goes on in file
@@ -36,7 +36,6 @@ ROOM, RING = (
 ASIDE = 0.6  # cosine of the smallest angle between a gate's axis and the place of a waiting person
 BESIDE = 1.0  # m beside a gate, behind it: it is passed, too
 NEAR_POINT = 0.5  # m: a point of the way counts as passed
-SHORT_CUT = 3.0  # m: and from here if the next one is seen
 AHEAD, FAR_AHEAD = 1.5, 3.5  # m ahead of the last of the group: people slow down, and wait
 SLOW = 0.4  # share of the speed of those who are ahead
 ROOMY = 2.0  # m from a gate: nearer nobody waits for the group
@@ -290,6 +289,10 @@ def _start_files(  # type: ignore[no-untyped-def]
     for g in range(len(length)):
         w = current[g]
         if count[g] and length[g] and not filing[g] and kind[g, w] != GATHER:
+            x, y = middle[g, X], middle[g, Y]
+            while gate[g, w] == CORNER and _sees_point(x, y, route[g, w + 1], gate[g, w + 1], closed, first):
+                w += 1
+            current[g] = w
             k = gate[g, w]
             at_gate = k >= 0 and _near(closed[first:], k, middle[g, X], middle[g, Y], NEAR_GATE)
             if at_gate or not _sees_point(middle[g, X], middle[g, Y], route[g, w], k, closed, first):
@@ -314,11 +317,9 @@ def _passes(x, y, g, w, route, gate, beyond, closed, first):  # type: ignore[no-
     if k >= 0:
         along, across, width = _across(closed[first:], k, x, y)
         return across * beyond[g, w] > PASSED and abs(along) < 0.5 * width + BESIDE
-    dx, dy = route[g, w, X] - x, route[g, w, Y] - y
-    d2 = dx * dx + dy * dy
-    if d2 <= NEAR_POINT * NEAR_POINT:
+    if _apart(route[g, w, X], route[g, w, Y], x, y) <= NEAR_POINT:
         return True
-    return d2 <= SHORT_CUT * SHORT_CUT and _sees_point(x, y, route[g, w + 1], gate[g, w + 1], closed, first)
+    return k == CORNER and _sees_point(x, y, route[g, w + 1], gate[g, w + 1], closed, first)
 
 
 @njit(cache=True)
