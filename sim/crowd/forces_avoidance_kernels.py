@@ -34,6 +34,7 @@ WALL_REACH, PILLAR_REACH = 1.2, 6.0  # m from a wall, from the edge of a pillar:
 SLOW = 0.6  # m/s
 USUAL_SPEED = 1.34
 HEADWAY = 0.2
+EVADE = 1.2
 BODY = 0.2  # m: distance from a wall or a pillar's edge at contact
 PILLAR_MARGIN = 1.2  # person radii that are added to a pillar's radius in the power law
 
@@ -129,11 +130,16 @@ def _slow_down(state, i, j, dx, dy, d, out):  # type: ignore[no-untyped-def]
     ahead than ROOM_AHEAD. It acts against the velocity, and fades below SLOW."""
     vx, vy = state[i, VX], state[i, VY]
     towards = -(vx * dx + vy * dy)
-    if towards > 0.0:
+    if towards > 0.0 and vx * state[j, VX] + vy * state[j, VY] > -0.05:
         away = max(0.0, -(state[j, VX] * dx + state[j, VY] * dy) / d)
         f = SLOWING * max(0.0, ROOM_AHEAD - d - HEADWAY * away) / d * towards / max(vx * vx + vy * vy, SLOW * SLOW)
         out[i, X] -= f * vx
         out[i, Y] -= f * vy
+    elif towards > 0.0:
+        side = 1.0 if vx * dy - vy * dx > 0.1 * d else -1.0  # away from them, to the right if straight ahead
+        f = EVADE * max(0.0, PERSON_RANGE - d) / d * towards / max(vx * vx + vy * vy, SLOW * SLOW)
+        out[i, X] -= side * f * vy
+        out[i, Y] += side * f * vx
 
 
 @njit(cache=True)
@@ -147,7 +153,7 @@ def _pair(state, tag, i, j, dx, dy, d2, out):  # type: ignore[no-untyped-def]
     else:
         strangers = True
     d = max(sqrt(d2), TINY)
-    if strangers and d < ROOM_AHEAD:
+    if strangers:
         _slow_down(state, i, j, dx, dy, d, out)
         _slow_down(state, j, i, -dx, -dy, d, out)
     if d < reach:
@@ -200,7 +206,7 @@ def _pairs(state, tag, out):  # type: ignore[no-untyped-def]
     """Adds the forces between people closer than PERSON_RANGE to out (N, 2), each pair once."""
     n = len(state)
     order, start, nx = _cells(state, PERSON_RANGE)
-    touch = max(SEPARATION_RANGE, QUEUE_SEPARATION_RANGE, ROOM_AHEAD)
+    touch = max(SEPARATION_RANGE, QUEUE_SEPARATION_RANGE, PERSON_RANGE)
     reach, touch, rows = PERSON_RANGE * PERSON_RANGE, touch * touch, np.zeros((5, n))
     for s in range(n):
         for k in range(4):
