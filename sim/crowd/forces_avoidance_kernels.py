@@ -17,24 +17,21 @@ from sim.elementary_kernels import exp, sort_by
 # isort: off
 # fmt: off
 from sim.crowd.forces import (
-    AVOID_GROUP, AVOID_MAX, AVOID_PERSON, AVOID_TIME, AVOIDED, COUNT, GROUP, GROUP_RANGE, IN_GROUP,
+    AVOID_GROUP, AVOID_MAX, AVOID_PERSON, AVOID_TIME, AVOIDED, COUNT, EVADING, GROUP, GROUP_RANGE, IN_GROUP,
     MAX_ACCELERATION, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y, MODE, PERSON_RADIUS, PERSON_RANGE, PILLAR_RADIUS,
-    PILLAR_X, PILLAR_Y, QUEUE, RADIUS, ROOM_AHEAD, SEPARATION, SEPARATION_RANGE, SHOVE, SLOWING, VX, VY, WALL, WALL_RANGE, X1, X2,
+    PILLAR_X, PILLAR_Y, QUEUE, RADIUS, ROOM_AHEAD, SEPARATION, SEPARATION_RANGE, SHOVE, SLOWING, USUAL_SPEED, VX, VY, WALL, WALL_RANGE, X1, X2,
     Y1, Y2, X, Y,
 )
 # fmt: on
 # isort: on
 
-WIDER = 4  # row after X … VY
 GROUP_REACH = 64.00000000000001  # m²: the number after that of GROUP_RANGE
 BRUTE = 48  # people, up to which all pairs are tried
 TINY = 1e-9  # m
 QUEUE_SEPARATION_RANGE = 0.5  # m: members of one queue repel each other up to this distance
 WALL_REACH, PILLAR_REACH = 1.2, 6.0  # m from a wall, from the edge of a pillar: no force beyond
-SLOW = 0.6  # m/s
-USUAL_SPEED = 1.34
-HEADWAY = 0.2
-EVADE = 1.2
+SLOW = 0.6  # m/s: below, people give way less, and walls push them less
+STRAIGHT = 0.1  # sine of the angle between a walker's way and who counts as straight ahead
 BODY = 0.2  # m: distance from a wall or a pillar's edge at contact
 PILLAR_MARGIN = 1.2  # person radii that are added to a pillar's radius in the power law
 
@@ -74,18 +71,17 @@ def _power_law(dx, dy, wx, wy, radius, strength):  # type: ignore[no-untyped-def
 def _candidates(rows, s, first, last, reach, touch, found, m):  # type: ignore[no-untyped-def]
     """Appends to found[m:] the discs first … last - 1 that may act on disc s; returns the new length.
 
-    rows (5, M): x, y, vx, vy, and by how much the radius exceeds PERSON_RADIUS. reach, touch: squares of distances, m².
+    Those within `touch`, and within `reach` those who come nearer; both are squares of distances, m². rows (4, M): x,
+    y, vx, vy.
     """
-    x, y, vx, vy, wider = rows[X], rows[Y], rows[VX], rows[VY], rows[WIDER]
+    x, y, vx, vy = rows[X], rows[Y], rows[VX], rows[VY]
     for t in range(np.uint64(first), np.uint64(last)):
         dx, dy = x[s] - x[t], y[s] - y[t]
         d2 = dx * dx + dy * dy
         if d2 < reach:
             wx, wy = vx[s] - vx[t], vy[s] - vy[t]
-            size, cross = wider[s] + wider[t] + 2.0 * PERSON_RADIUS, dx * wy - dy * wx
-            root = (wx * wx + wy * wy) * size * size - cross * cross
             found[m] = t
-            m += np.uint64((d2 < touch) | ((dx * wx + dy * wy < 0.0) & (root > 1e-12)))
+            m += np.uint64((d2 < touch) | (dx * wx + dy * wy < 0.0))
     return m
 
 
@@ -98,9 +94,9 @@ def _avoid_groups(status, push, by_x):  # type: ignore[no-untyped-def]
     for g in by_x:
         live[m] = g
         m += status[g, AVOIDED] > 0.0
-    rows = np.empty((5, m))  # columns MEAN_X … RADIUS of `status` as rows, groups sorted by x
+    rows = np.empty((4, m))  # columns MEAN_X … MEAN_VY of `status` as rows, groups sorted by x
     for s in range(m):
-        for k in range(5):
+        for k in range(4):
             rows[k, s] = status[live[s], MEAN_X + k]
     found = np.empty(m + 1, np.uint32)
     last = 0
@@ -125,21 +121,26 @@ def _avoid_groups(status, push, by_x):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _slow_down(state, i, j, dx, dy, d, out):  # type: ignore[no-untyped-def]
-    """Adds to out (N, 2) what slows person i down for the stranger at distance d in the direction -(dx, dy): less room
-    ahead than ROOM_AHEAD. It acts against the velocity, and fades below SLOW."""
+def _give_way(state, i, j, dx, dy, d, out):  # type: ignore[no-untyped-def]
+    """Adds to out (N, 2) what a stranger j ahead does to person i, at distance d in the direction -(dx, dy).
+
+    Who walks the same way slows i down within ROOM_AHEAD, against the velocity. Others who come nearer i evades, across
+    it: to the side on which i is, to the right of who is straight ahead. Both fade below SLOW.
+    """
     vx, vy = state[i, VX], state[i, VY]
-    towards = -(vx * dx + vy * dy)
-    if towards > 0.0 and vx * state[j, VX] + vy * state[j, VY] > -0.05:
-        away = max(0.0, -(state[j, VX] * dx + state[j, VY] * dy) / d)
-        f = SLOWING * max(0.0, ROOM_AHEAD - d - HEADWAY * away) / d * towards / max(vx * vx + vy * vy, SLOW * SLOW)
+    towards = -(vx * dx + vy * dy) / d
+    if towards <= 0.0:
+        return
+    size = max(sqrt(vx * vx + vy * vy), SLOW)
+    if vx * state[j, VX] + vy * state[j, VY] > 0.0:
+        f = SLOWING * max(0.0, ROOM_AHEAD - d) * towards / (size * size)
         out[i, X] -= f * vx
         out[i, Y] -= f * vy
-    elif towards > 0.0:
-        side = 1.0 if vx * dy - vy * dx > 0.1 * d else -1.0  # away from them, to the right if straight ahead
-        f = EVADE * max(0.0, PERSON_RANGE - d) / d * towards / max(vx * vx + vy * vy, SLOW * SLOW)
-        out[i, X] -= side * f * vy
-        out[i, Y] += side * f * vx
+    elif (vx - state[j, VX]) * dx + (vy - state[j, VY]) * dy < 0.0:
+        side = 1.0 if vx * dy - vy * dx > STRAIGHT * d * size else -1.0
+        f = side * EVADING * (PERSON_RANGE - d) * towards / (size * size)
+        out[i, X] -= f * vy
+        out[i, Y] += f * vx
 
 
 @njit(cache=True)
@@ -154,8 +155,8 @@ def _pair(state, tag, i, j, dx, dy, d2, out):  # type: ignore[no-untyped-def]
         strangers = True
     d = max(sqrt(d2), TINY)
     if strangers:
-        _slow_down(state, i, j, dx, dy, d, out)
-        _slow_down(state, j, i, -dx, -dy, d, out)
+        _give_way(state, i, j, dx, dy, d, out)
+        _give_way(state, j, i, -dx, -dy, d, out)
     if d < reach:
         f = strength * (1.0 - d / reach) / d
         fx, fy = f * dx, f * dy
@@ -206,8 +207,7 @@ def _pairs(state, tag, out):  # type: ignore[no-untyped-def]
     """Adds the forces between people closer than PERSON_RANGE to out (N, 2), each pair once."""
     n = len(state)
     order, start, nx = _cells(state, PERSON_RANGE)
-    touch = max(SEPARATION_RANGE, QUEUE_SEPARATION_RANGE, PERSON_RANGE)
-    reach, touch, rows = PERSON_RANGE * PERSON_RANGE, touch * touch, np.zeros((5, n))
+    reach, touch, rows = PERSON_RANGE * PERSON_RANGE, ROOM_AHEAD * ROOM_AHEAD, np.zeros((4, n))
     for s in range(n):
         for k in range(4):
             rows[k, s] = state[order[s], k]

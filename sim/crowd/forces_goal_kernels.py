@@ -16,7 +16,7 @@ from sim.crowd.forces import (
     ALIGNMENT, ALONE, AMPLITUDE, AVOIDED, COHESION_TIME, COS, COUNT, END, GATHER,
     GATHER_RADIUS, GROUP, HASTE, MAX_OFF_PLACE, MEAN_AHEAD, MEAN_LEFT, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y,
     MODE, PASS, PASS_RADIUS, RADIUS, RELAXATION, SIN, SLOW_TIME, SLOWDOWN, STAND, STRAY_AHEAD, STRAY_LEFT,
-    SWAY_X, SWAY_Y, TO_TARGET, TURN_TIME, VX, VY, WANDER_ALONG, WANDER_LEFT, WANTED_VX, WANTED_VY, X, Y,
+    SWAY_X, SWAY_Y, TO_TARGET, TURN_TIME, USUAL_SPEED, VX, VY, WANDER_ALONG, WANDER_LEFT, WANTED_VX, WANTED_VY, X, Y,
 )
 # fmt: on
 # isort: on
@@ -26,7 +26,6 @@ from sim.scene.terrain import AXIS_X, AXIS_Y, FOOT_X, FOOT_Y, HALF_WIDTH, LENGTH
 
 STRIDES = 0.807  # strides per s at 1 m/s: 0.0064 m of step per step/min (Sekiya & Nagasaki 1998)
 SWAYLESS = 2.70  # m/s: on the line through amplitudes of 0.0350 m at 0.7 m/s and 0.0193 m at 1.6 m/s (Orendurff 2004)
-USUAL_SPEED = 1.34  # m/s: speed to which the amplitude of a person's sway refers
 SLOW = 0.3  # m/s: below, the amplitude falls to 0 with the speed
 PI = 3.141592653589793
 

@@ -4,8 +4,8 @@ cannot walk as one.
 A group walks in its formation while all members see its middle, and the middle sees the next point of the way. Else,
 and at a gate, it goes in file: each member walks to the next point of the way that they have not passed. Who does not
 see that point walks to the corner at which the shortest way there begins. Who is ahead waits for the last one, for 20
-s; from then on each walks alone. At a gate where two people cannot pass each other, and where two crowds meet at one
-that is no wider than 2.2 m, the sides take turns; in others people keep to the right while others come.
+s; from then on each walks alone. At a gate where two people cannot pass each other, the sides take turns; in
+others people keep to the right while others come.
 """
 
 from __future__ import annotations

@@ -20,19 +20,16 @@ BOTH = 2.0
 FREE, CORNER = -1, -2  # no gate, but a point of the scenario's, or one round the end of a wall
 
 BODY, TOUCH = 0.2, 0.01  # m: people walk no nearer past the end of a wall; ends so near are one
+STEP_ASIDE = 0.5  # m ahead: past ends of walls so near to them people squeeze
 NEAR_GATE = 2.0  # m from a gate: a group goes on in file
 PASSED = 0.35  # m behind a gate: a person has passed it
 AIM_BEYOND, AIM_BEFORE = 0.6, 0.45  # m from a gate: where people walk to who are before its opening, or beside it
 EDGE, MIDDLE = 0.35, 0.15  # m that people keep from the sides of a gate, and from its middle while others come
-LANES, CROWD_LANES = 1.4, 2.2  # m: in wider gates two people pass each other, and two crowds do
-FEW = 2  # people are no crowd
+LANES = 1.4  # m: in wider gates two people pass each other
 DEMAND = 3.0  # m from a gate: people count who want to pass it
-TURN = 5.0  # s after which a gate is the other side's, if people wait there
+TURN = 8.0  # s after which a gate is the other side's, if people wait there
 CLEARED = 4.0  # s after which a gate counts as left, whoever is in it
-ROOM, RING = (
-    1.4,
-    0.6,
-)  # m from a gate's middle: nearer nobody waits, and up to RING m beyond, nobody waits before the opening
+ROOM, RING = 1.4, 0.6  # m from a gate's middle, and m beyond: nobody waits there, or not before the opening
 ASIDE = 0.6  # cosine of the smallest angle between a gate's axis and the place of a waiting person
 BESIDE = 1.0  # m beside a gate, behind it: it is passed, too
 NEAR_POINT = 0.5  # m: a point of the way counts as passed
@@ -54,9 +51,10 @@ def _ends(x, y, closed, k):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def sees(ax, ay, bx, by, closed, first, skip, also):  # type: ignore[no-untyped-def]
     """Returns True if a body has room on the segment from a to b: no closed segment but those of indices `skip` and
-    `also` crosses it, and no end of a wall, but at their sides, is nearer than BODY."""
+    `also` crosses it, and no end of a wall further along than STEP_ASIDE, but at their sides, is nearer than BODY."""
     ux, uy = bx - ax, by - ay
     size = ux * ux + uy * uy
+    step = STEP_ASIDE * sqrt(size)
     for k in range(len(closed)):
         px, py, qx, qy = closed[k, 0], closed[k, 1], closed[k, 2], closed[k, 3]
         if max(px, qx) < min(ax, bx) - BODY or min(px, qx) > max(ax, bx) + BODY or k in (skip, also):
@@ -70,10 +68,10 @@ def sees(ax, ay, bx, by, closed, first, skip, also):  # type: ignore[no-untyped-
             return False
         if k < first:
             along, further = ux * (px - ax) + uy * (py - ay), ux * (qx - ax) + uy * (qy - ay)
-            near = 0.0 < along < size and s1 * s1 < BODY * BODY * size
+            near = step < along < size and s1 * s1 < BODY * BODY * size
             if near and not (_ends(px, py, closed, skip) or _ends(px, py, closed, also)):
                 return False
-            near = 0.0 < further < size and s2 * s2 < BODY * BODY * size
+            near = step < further < size and s2 * s2 < BODY * BODY * size
             if near and not (_ends(qx, qy, closed, skip) or _ends(qx, qy, closed, also)):
                 return False
     return True
@@ -229,7 +227,7 @@ def _take_turns(gates, state, wants, side, gate_state, dt):  # type: ignore[no-u
     for k in range(n):
         opposed[k, 0], opposed[k, 1] = waiting[k, 1] > 0, waiting[k, 0] > 0
         _, _, width = _across(gates, k, 0.0, 0.0)
-        if width > CROWD_LANES or (width > LANES and min(waiting[k, 0], waiting[k, 1]) <= FEW):
+        if width > LANES:
             gate_state[k, HOLDER], gate_state[k, HELD] = BOTH, 0.0
             continue
         h = gate_state[k, HOLDER] if gate_state[k, HOLDER] != BOTH else 0.0
