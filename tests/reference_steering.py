@@ -24,6 +24,20 @@ def power_law(d: Array, w: Array, radius: float, strength: float, horizon: float
     return np.asarray(f * min(1.0, cap / max(np.linalg.norm(f), 1e-12)))
 
 
+def giving_way(d: Array, v: Array, other: Array) -> Array:
+    """What a stranger does to a person of velocity v from whom they are -d away, and walk with velocity `other`."""
+    distance, speed = max(np.linalg.norm(d), 1e-9), max(np.linalg.norm(v), 0.6)
+    ahead, along, left = -(v @ d) / distance / speed, v / speed, np.array([-v[1], v[0]]) / speed
+    if ahead <= 0:
+        return np.zeros(2)
+    if v @ other > 0:
+        return np.asarray(-s.SLOWING * max(0.0, s.ROOM_AHEAD - distance) * ahead * along)
+    if (v - other) @ d >= 0:
+        return np.zeros(2)
+    side = 1 if left @ d > 0.1 * distance else -1
+    return np.asarray(side * s.EVADING * (s.PERSON_RANGE - distance) * ahead * left)
+
+
 def between_people(state: Array, tag: Ints) -> Array:
     """Separation within groups and queues, avoidance and shoving between strangers, (N, 2)."""
     out = np.zeros((len(state), 2))
@@ -38,9 +52,11 @@ def between_people(state: Array, tag: Ints) -> Array:
             elif tag[i, QUEUE] >= 0 and tag[i, QUEUE] == tag[j, QUEUE]:
                 reach, strength = 0.5, s.SEPARATION
             elif distance < 2 * s.PERSON_RADIUS:
+                out[i] += giving_way(d, state[i, 2:], state[j, 2:])
                 reach, strength = 2 * s.PERSON_RADIUS, s.SHOVE
             else:
                 w = state[i, 2:] - state[j, 2:]
+                out[i] += giving_way(d, state[i, 2:], state[j, 2:])
                 out[i] += power_law(d, w, 2 * s.PERSON_RADIUS, s.AVOID_PERSON, s.AVOID_TIME, s.AVOID_MAX)
                 continue
             out[i] += strength * max(0.0, 1 - distance / reach) * d / max(distance, 1e-9)
@@ -65,20 +81,21 @@ def between_groups(status: Array) -> Array:
     return out
 
 
-def from_things(state: Array, walls: Array, pillars: Array) -> Array:
+def from_things(state: Array, wanted: Array, walls: Array, pillars: Array) -> Array:
     """Repulsion of walls within 1.2 m and of pillars within 6 m of their edge, and anticipation of pillars, (N, 2)."""
     out, body = np.zeros((len(state), 2)), 0.2
     for i, (x, v) in enumerate(zip(state[:, :2], state[:, 2:], strict=True)):
+        strength = s.WALL * min(1.0, max(np.linalg.norm(wanted[i]), 0.6) / s.USUAL_SPEED)
         for wall in walls:
             a, u = wall[:2], wall[2:] - wall[:2]
             d = x - a - np.clip((x - a) @ u / (u @ u + 1e-9), 0, 1) * u
             r = np.linalg.norm(d)
-            out[i] += (r < 1.2) * s.WALL * np.exp(-(r - body) / s.WALL_RANGE) * d / max(r, 1e-9)
+            out[i] += (r < 1.2) * strength * np.exp(-(r - body) / s.WALL_RANGE) * d / max(r, 1e-9)
         for pillar in pillars:
             d, radius = x - pillar[:2], pillar[2]
             r = np.linalg.norm(d)
             if r < radius + 6:
-                out[i] += s.WALL * np.exp(-(r - body - radius) / s.WALL_RANGE) * d / max(r, 1e-9)
+                out[i] += strength * np.exp(-(r - body - radius) / s.WALL_RANGE) * d / max(r, 1e-9)
                 wide = radius + 1.2 * s.PERSON_RADIUS
                 out[i] += power_law(d, v, wide, s.AVOID_PERSON, s.AVOID_TIME, s.AVOID_MAX)
     return out

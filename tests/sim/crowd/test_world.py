@@ -54,7 +54,7 @@ def test_round_the_end_of_a_wall():
     assert len(points) == 2
     assert points[0][0] == 10
     assert points[0][1] < 3
-    assert gates.tolist() == [-1, -1]
+    assert gates.tolist() == [-2, -1]
 
 
 @pytest.mark.parametrize("seed", range(3))
