@@ -114,6 +114,7 @@ Seconds = Annotated[Value, within(0.0, 3600.0, " s")]  # of standing or being se
 Noise = Annotated[float, within(0.0, 1.0, " m/s")]
 Height = Annotated[Value, within(0.3, 3.0, " m")]
 Stray = Annotated[float, within(0.0, 2.0, " m")]
+Factor = Annotated[float, within(0.0, 10.0)]
 Length = Annotated[float, within(0.1, 10_000.0, " m")]
 AtGoal = Literal["stand", "leave", "walk"]
 
@@ -231,6 +232,9 @@ class CrowdSpec(Model):
         sway: amplitude of the sideways movement with each stride at 1.34 m/s, m; 0 = none
         velocity_noise: standard deviations of the wanted velocity along and across it, m/s; 0 = steady
         place_noise: standard deviations of a member's place in a walking group, forward and sideways, m
+        separation: factor on the force that keeps members of a group apart; 0 = none
+        alignment: factor on the force by which they take up each other's velocity
+        cohesion: factor on the force that holds them together
     """
 
     free_speed: Speed = FREE_SPEED
@@ -240,6 +244,9 @@ class CrowdSpec(Model):
     sway: Annotated[Value, within(0.0, 0.2, " m")] = SWAY
     velocity_noise: tuple[Noise, Noise] = (0.08, 0.13)
     place_noise: tuple[Stray, Stray] = (0.15, 0.05)
+    separation: Factor = 1.0
+    alignment: Factor = 1.0
+    cohesion: Factor = 1.0
 
 
 class Stop(Model):
@@ -279,6 +286,8 @@ class GroupSpec(Model):
         via: points to pass on the way
         scatter: distance of each member from its place in the group when the group enters, m; drawn for each member, in
             any direction
+        formation: rows = a place for each: pairs abreast, triads in a V, larger groups in rows of them; none = a flock:
+            no places, each member keeps to the neighbours
         speed: speed of the whole group, m/s; absent: follows from its members' speeds
         height: body height of each member, m; absent: crowd.height
         clothes: colour of the upper garment, or several, one of which is drawn for each member; absent: any
@@ -295,6 +304,7 @@ class GroupSpec(Model):
     stops: tuple[Stop, ...] = ()
     via: tuple[Point, ...] = ()
     scatter: Annotated[Value, within(0.0, 10.0, " m")] = 0.0
+    formation: Literal["rows", "none"] = "rows"
     speed: Speed | None = None
     height: Height | None = None
     clothes: Colours | None = None

@@ -10,8 +10,9 @@ Forces on a person, in the order in which they are computed:
 avoidance forces and the goal force is capped at MAX_ACCELERATION. If the whole scene is turned or moved, the
 forces turn or move with it. The order of people changes them by rounding only.
 
-Model: boids inside a group (separation: members repel each other; alignment: they take up the group's velocity;
-cohesion: they keep their places), and a power law of the time to collision between strangers (Karamouzas, Skinner & Guy
+Model: boids inside a group (Reynolds 1987). Separation: members repel each other; alignment: they take up the others'
+velocity; cohesion: they keep their places in the formation, or in a flock, which has none, go to the middle of their
+neighbours. Between strangers: a power law of the time to collision between strangers (Karamouzas, Skinner & Guy
 2014). *Ours*: groups also avoid each other as wholes, so strangers walk round a group and seldom through it. A group
 waits at its gathering point until all members are there.
 """
@@ -53,6 +54,10 @@ COS, SIN, SWAY_X, SWAY_Y, AMPLITUDE = range(5)
     MEAN_LEFT,
 ) = range(12)  # fmt: skip
 
+# columns of GroupArrays.boids (G, 4): repulsion of two members at distance zero, m/s²; distance at which it ends, m;
+# rate at which a member takes up the others' mean velocity, 1/s, and goes to its place or their middle, 1/s
+REPULSION, REACH, ALIGN, COHERE = range(4)
+
 # columns of Obstacles.walls (W, 4) and .pillars (P, 3); the last one of .stairs (S, 10), after those of `terrain`
 X1, Y1, X2, Y2 = range(4)
 PILLAR_X, PILLAR_Y, PILLAR_RADIUS = range(3)
@@ -62,6 +67,9 @@ SLOWDOWN = 9
 RELAXATION = 0.5  # s: time in which a person takes up the wanted velocity
 COHESION_TIME = 1.6  # s: time in which a member returns to its place in the formation
 ALIGNMENT = 0.25  # 1/s: rate at which a member takes up the group's mean velocity
+FLOCK_ALIGNMENT = 2.0  # 1/s: the same in a flock, of the neighbours' mean velocity
+FLOCK_RANGE = 3.0  # m: members of a flock so near are neighbours
+FLOCK_REACH = 1.4  # distances of neighbours at which their repulsion ends in a flock
 SEPARATION = 2.5  # m/s²: repulsion between two members at distance zero
 SEPARATION_RANGE = 0.6  # m: distance at which that repulsion ends
 HASTE = 0.15  # share of the group's speed that a member may add to keep its place
@@ -87,7 +95,10 @@ MAX_ACCELERATION = 2.2  # m/s²: cap of the sum of all forces
 
 
 class GroupArrays(NamedTuple):
-    """State of G groups and of the ways they walk. The goal kernels update all from current on but speed and finish."""
+    """State of G groups and of the ways they walk.
+
+    The goal kernels update all from current to by_x but speed and finish.
+    """
 
     route: Array  # (G, W, 2) x, y of each group's waypoints, m
     kind: Ints  # (G, W) PASS, GATHER or END of each waypoint
@@ -106,6 +117,8 @@ class GroupArrays(NamedTuple):
     status: Array
     push: Array  # (G, 2) acceleration by which each group avoids other groups, m/s²
     by_x: Ints  # (G,) indices of the groups, sorted by the x of their members in the last step
+    flock: Bools  # (G,) True for groups without formation
+    boids: Array  # (G, 4) strengths of the forces between members
 
     @classmethod
     def empty(cls, g: int, w: int) -> GroupArrays:
@@ -113,7 +126,8 @@ class GroupArrays(NamedTuple):
         return cls(
             np.zeros((g, w, 2)), np.zeros((g, w), np.int64), np.zeros(g, np.int64), np.zeros(g, np.int64), np.zeros(g),
             np.tile([1.0, 0.0], (g, 1)), np.zeros(g, np.int64), np.zeros(g, np.bool_), np.zeros(g),
-            np.zeros(g, np.bool_), np.zeros((g, 12)), np.zeros((g, 2)), np.arange(g),
+            np.zeros(g, np.bool_), np.zeros((g, 12)), np.zeros((g, 2)), np.arange(g), np.zeros(g, np.bool_),
+            np.tile([SEPARATION, SEPARATION_RANGE, ALIGNMENT, 1.0 / COHESION_TIME], (g, 1)),
         )  # fmt: skip
 
     def with_room(self, w: int) -> GroupArrays:

@@ -19,7 +19,8 @@ from sim.elementary_kernels import exp, sort_by
 from sim.crowd.forces import (
     AVOID_GROUP, AVOID_MAX, AVOID_PERSON, AVOID_TIME, AVOIDED, COUNT, EVADING, GROUP, GROUP_RANGE, IN_GROUP,
     MAX_ACCELERATION, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y, MODE, PERSON_RADIUS, PERSON_RANGE, PILLAR_RADIUS,
-    PILLAR_X, PILLAR_Y, QUEUE, RADIUS, ROOM_AHEAD, SEPARATION, SEPARATION_RANGE, SHOVE, SLOWING, USUAL_SPEED, VX, VY, WALL, WALL_RANGE, X1, X2,
+    PILLAR_X, PILLAR_Y, QUEUE, RADIUS, REACH, REPULSION, ROOM_AHEAD, SEPARATION,
+    SHOVE, SLOWING, USUAL_SPEED, VX, VY, WALL, WALL_RANGE, X1, X2,
     Y1, Y2, X, Y,
 )
 # fmt: on
@@ -144,11 +145,11 @@ def _give_way(state, i, j, dx, dy, d, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _pair(state, tag, i, j, dx, dy, d2, out):  # type: ignore[no-untyped-def]
+def _pair(state, tag, boids, i, j, dx, dy, d2, out):  # type: ignore[no-untyped-def]
     """Adds the forces between persons i and j to out (N, 2); (dx, dy) = position i - position j, d2 its square."""
     strength, reach, strangers = SHOVE, 2.0 * PERSON_RADIUS, False
     if tag[i, GROUP] == tag[j, GROUP]:
-        strength, reach = SEPARATION, SEPARATION_RANGE
+        strength, reach = boids[tag[i, GROUP], REPULSION], boids[tag[i, GROUP], REACH]
     elif tag[i, QUEUE] >= 0 and tag[i, QUEUE] == tag[j, QUEUE]:
         strength, reach = SEPARATION, QUEUE_SEPARATION_RANGE
     else:
@@ -203,11 +204,13 @@ def _cells(state, reach):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _pairs(state, tag, out):  # type: ignore[no-untyped-def]
+def _pairs(state, tag, boids, out):  # type: ignore[no-untyped-def]
     """Adds the forces between people closer than PERSON_RANGE to out (N, 2), each pair once."""
     n = len(state)
     order, start, nx = _cells(state, PERSON_RANGE)
     reach, touch, rows = PERSON_RANGE * PERSON_RANGE, ROOM_AHEAD * ROOM_AHEAD, np.zeros((4, n))
+    for g in range(len(boids)):
+        touch = max(touch, boids[g, REACH] * boids[g, REACH])
     for s in range(n):
         for k in range(4):
             rows[k, s] = state[order[s], k]
@@ -225,7 +228,7 @@ def _pairs(state, tag, out):  # type: ignore[no-untyped-def]
             for k in range(m):
                 j = np.uint64(order[found[k]])
                 dx, dy = state[i, X] - state[j, X], state[i, Y] - state[j, Y]
-                _pair(state, tag, i, j, dx, dy, dx * dx + dy * dy, out)
+                _pair(state, tag, boids, i, j, dx, dy, dx * dx + dy * dy, out)
 
 
 @njit(cache=True)
@@ -263,14 +266,14 @@ def _walls(state, wanted, walls, pillars, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def avoid(state, wanted, tag, status, push, by_x, walls, pillars, out):  # type: ignore[no-untyped-def]
+def avoid(state, wanted, tag, status, push, by_x, boids, walls, pillars, out):  # type: ignore[no-untyped-def]
     """Adds all avoidance accelerations to out (N, 2), and cuts each sum to MAX_ACCELERATION.
 
     state (N, 4), tag (N, 4), status (G, 12), push (G, 2), by_x (G,), walls (W, 4), pillars (P, 3): as in `forces`.
     walls: None if there are neither walls nor pillars, so that nothing of them is compiled.
     """
     _avoid_groups(status, push, by_x)
-    _pairs(state, tag, out)
+    _pairs(state, tag, boids, out)
     if walls is not None:
         _walls(state, wanted, walls, pillars, out)
     for i in range(len(state)):

@@ -8,13 +8,15 @@ from __future__ import annotations
 
 from math import sqrt
 
+import numpy as np
+
 from sim.compiler import njit
 
 # isort: off
 # fmt: off
 from sim.crowd.forces import (
-    ALIGNMENT, ALONE, AMPLITUDE, AVOIDED, COHESION_TIME, COS, COUNT, END, GATHER,
-    GATHER_RADIUS, GROUP, HASTE, MAX_OFF_PLACE, MEAN_AHEAD, MEAN_LEFT, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y,
+    ALIGN, ALONE, AMPLITUDE, AVOIDED, COHERE, COS, COUNT, END, FLOCK_RANGE, GATHER,
+    GATHER_RADIUS, GROUP, HASTE, IN_GROUP, MAX_OFF_PLACE, MEAN_AHEAD, MEAN_LEFT, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y,
     MODE, PASS, PASS_RADIUS, RADIUS, RELAXATION, SIN, SLOW_TIME, SLOWDOWN, STAND, STRAY_AHEAD, STRAY_LEFT,
     SWAY_X, SWAY_Y, TO_TARGET, TURN_TIME, USUAL_SPEED, VX, VY, WANDER_ALONG, WANDER_LEFT, WANTED_VX, WANTED_VY, X, Y,
 )
@@ -168,9 +170,32 @@ def _turn(heading, g, ex, ey, share):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _flock(state, tag, flock, middle):  # type: ignore[no-untyped-def]
+    """Overwrites middle (N, 4) of the members of flocks: mean position and velocity of their neighbours, or their own.
+
+    Neighbours are members of the flock within FLOCK_RANGE who walk with it.
+    """
+    for i in range(len(state)):
+        if not flock[tag[i, GROUP]]:
+            continue
+        count = 0
+        middle[i] = 0.0
+        for j in range(len(state)):
+            if j != i and tag[j, GROUP] == tag[i, GROUP] and tag[j, MODE] == IN_GROUP:
+                dx, dy = state[i, X] - state[j, X], state[i, Y] - state[j, Y]
+                if dx * dx + dy * dy < FLOCK_RANGE * FLOCK_RANGE:
+                    middle[i] += state[j]
+                    count += 1
+        if count:
+            middle[i] /= count
+        else:
+            middle[i] = state[i]
+
+
+@njit(cache=True)
 def _seek(  # type: ignore[no-untyped-def]
     state, place, target, pace, noise, wanted, tag,
-    route, kind, length, current, speed, heading, status, stairs, out,
+    route, kind, length, current, speed, heading, status, flock, boids, middle, stairs, out,
 ):  # fmt: skip
     """Overwrites out (N, 2) with the acceleration of each person towards its goal."""
     for i in range(len(state)):
@@ -178,7 +203,7 @@ def _seek(  # type: ignore[no-untyped-def]
         x, y, vx, vy = state[i, X], state[i, Y], state[i, VX], state[i, VY]
         w = current[g]
         goal = kind[g, w]
-        align, on_stairs = 0.0, 1.0
+        align, mvx, mvy, on_stairs = 0.0, 0.0, 0.0, 1.0
         if stairs is not None:
             on_stairs = _pace_on_stairs(x, y, stairs)
         if tag[i, MODE] == TO_TARGET:
@@ -203,11 +228,16 @@ def _seek(  # type: ignore[no-untyped-def]
                 tx = (route[g, w, 0] + ox - x) / GATHER_TIME
                 ty = (route[g, w, 1] + oy - y) / GATHER_TIME
             else:
-                limit = speed[g] * (1.0 + HASTE)
-                tx = on_stairs * status[g, WANTED_VX] + (status[g, MEAN_X] + ox - x) / COHESION_TIME
-                ty = on_stairs * status[g, WANTED_VY] + (status[g, MEAN_Y] + oy - y) / COHESION_TIME
-                if status[g, COUNT] > 1.0:
-                    align = ALIGNMENT
+                own, align = on_stairs, boids[g, ALIGN]
+                if flock[g]:
+                    own *= pace[i] / speed[g]
+                    mx, my, mvx, mvy = middle[i, X], middle[i, Y], middle[i, VX], middle[i, VY]
+                else:
+                    mx, my = status[g, MEAN_X] + ox, status[g, MEAN_Y] + oy
+                    mvx, mvy = status[g, MEAN_VX], status[g, MEAN_VY]
+                limit = speed[g] * (1.0 + HASTE) * (own / on_stairs)
+                tx = own * status[g, WANTED_VX] + boids[g, COHERE] * (mx - x)
+                ty = own * status[g, WANTED_VY] + boids[g, COHERE] * (my - y)
         limit *= on_stairs
         size = sqrt(tx * tx + ty * ty)
         if size > limit:
@@ -219,8 +249,8 @@ def _seek(  # type: ignore[no-untyped-def]
         tx += share * (noise[i, WANDER_ALONG] * ex - noise[i, WANDER_LEFT] * ey)
         ty += share * (noise[i, WANDER_ALONG] * ey + noise[i, WANDER_LEFT] * ex)
         wanted[i, 0], wanted[i, 1] = size * ex, size * ey
-        out[i, 0] = (tx - vx) / RELAXATION + align * (status[g, MEAN_VX] - vx)
-        out[i, 1] = (ty - vy) / RELAXATION + align * (status[g, MEAN_VY] - vy)
+        out[i, 0] = (tx - vx) / RELAXATION + align * (mvx - vx)
+        out[i, 1] = (ty - vy) / RELAXATION + align * (mvy - vy)
 
 
 @njit(cache=True)
@@ -246,7 +276,7 @@ def _mark_avoided(filing, status):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def accelerate(  # type: ignore[no-untyped-def]
     state, place, target, pace, noise, gait, calm, wanted, tag,
-    route, kind, length, current, speed, heading, finish, filing, held_up, arrived, status, push, by_x,
+    route, kind, length, current, speed, heading, finish, filing, held_up, arrived, status, push, by_x, flock, boids,
     stairs, walls, pillars, dt, out,
 ):  # fmt: skip
     """Overwrites out (N, 2) with the accelerations of all people, m/s², and advances ways and strides by dt (s).
@@ -263,11 +293,14 @@ def accelerate(  # type: ignore[no-untyped-def]
     _average(calm, noise, tag, status)
     _spread(calm, place, tag, route, kind, current, heading, status)
     _lead_groups(route, kind, length, current, speed, heading, finish, filing, held_up, arrived, status, dt)
+    middle = np.empty((len(state) if flock.any() else 0, 4))
+    if len(middle):
+        _flock(calm, tag, flock, middle)
     _seek(
         calm, place, target, pace, noise, wanted, tag,
-        route, kind, length, current, speed, heading, status, stairs, out,
+        route, kind, length, current, speed, heading, status, flock, boids, middle, stairs, out,
     )  # fmt: skip
     _mark_avoided(filing, status)
     _sway(wanted, gait, dt, out)
-    avoid(calm, wanted, tag, status, push, by_x, walls, pillars, out)
+    avoid(calm, wanted, tag, status, push, by_x, boids, walls, pillars, out)
     return True

@@ -9,7 +9,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from sim.crowd.forces import ALONE, END, GATHER, IN_GROUP, LEAVE, PASS, STAND, TO_TARGET, GroupArrays, PeopleArrays
+from scenarios.schema.scenario import CrowdSpec
+from sim.crowd.forces import (
+    ALIGN,
+    ALONE,
+    END,
+    FLOCK_ALIGNMENT,
+    FLOCK_REACH,
+    GATHER,
+    IN_GROUP,
+    LEAVE,
+    PASS,
+    REACH,
+    STAND,
+    TO_TARGET,
+    GroupArrays,
+    PeopleArrays,
+)
 from sim.crowd.formation import assign, standing, to_world, walking
 from sim.crowd.navigation import Navigator
 from sim.crowd.population import EnteringGroup, walking_speed
@@ -36,10 +52,10 @@ class GroupState:
     True for a person who has come to the end of the way alone, and leaves; present; free_speed (m/s).
     """
 
-    def __init__(self, entering: list[EnteringGroup], new: int, navigator: Navigator, slowdown: float) -> None:
-        """Starts with nobody present. new: greatest number of groups that orders make. slowdown: m/s per member."""
+    def __init__(self, entering: list[EnteringGroup], new: int, navigator: Navigator, crowd: CrowdSpec) -> None:
+        """Starts with nobody present. new: greatest number of groups that orders make."""
         people = [m for g in entering for m in g.members]
-        self.navigator, self.slowdown = navigator, slowdown
+        self.navigator, self.crowd = navigator, crowd
         self.arrays = GroupArrays.empty(len(entering) + new, WAY)
         self.next_group = len(entering)
         self.alive: dict[str, int] = {g.name: g.index for g in entering}
@@ -55,8 +71,9 @@ class GroupState:
         self.alone, self.gone = np.zeros(len(people), np.bool_), np.zeros(len(people), np.bool_)
         self.waypoint, self.apart = np.zeros(len(people), np.int64), np.full(len(people), -1)
         self.gate, self.beyond = np.full(self.arrays.kind.shape, -1), np.zeros(self.arrays.kind.shape)
-        for index, columns in self.members.items():
-            self.group_of[columns] = index
+        for g in entering:
+            self.group_of[self.members[g.index]] = g.index
+            self._hold_together(g.index, g.flock)
         self.held = np.zeros(len(people), np.bool_)
         self.present = np.zeros(len(people), np.bool_)
         self.settled: set[int] = set()
@@ -158,18 +175,31 @@ class GroupState:
             arrays.heading[g] = ahead / size
         self.waypoint[self.members[g]] = 0
 
-    def new_group(self, name: str, columns: list[int], spacing: float) -> int:
-        """Makes a group of the people in `columns`, takes them out of queues, and returns the new group's index."""
+    def _hold_together(self, g: int, flock: bool) -> None:
+        """Sets the forces between the members of group g. flock: it has no formation."""
+        crowd, boids = self.crowd, self.arrays.boids[g]
+        self.arrays.flock[g] = flock
+        boids *= crowd.separation, 1.0, crowd.alignment, crowd.cohesion
+        if flock:
+            boids[REACH], boids[ALIGN] = FLOCK_REACH * self.spacing[g], FLOCK_ALIGNMENT * crowd.alignment
+
+    def new_group(self, name: str, columns: list[int], parents: list[int]) -> int:
+        """Makes a group of the people in `columns`, takes them out of queues, and returns the new group's index.
+
+        parents: the groups they come from. It keeps their mean spacing, and is a flock if all of them were.
+        """
         g = self.next_group
         self.next_group += 1
-        self.alive[name], self.members[g], self.spacing[g] = g, sorted(columns), spacing
+        self.alive[name], self.members[g] = g, sorted(columns)
+        self.spacing[g] = float(np.mean([self.spacing[p] for p in parents]))
+        self._hold_together(g, bool(self.arrays.flock[parents].all()))
         self.group_of[columns] = g
         self.queue_of[columns] = -1
         return g
 
     def walking_speed(self, columns: list[int]) -> float:
         """Returns the speed in m/s of a group of the people in `columns`; see `population.walking_speed`."""
-        return walking_speed(list(self.free_speed[columns]), self.slowdown)
+        return walking_speed(list(self.free_speed[columns]), self.crowd.slowdown_per_member)
 
     def take_places(self, columns: list[int], places: Array, middle: Array, g: int, pos: Array) -> None:
         """Gives each of the people in `columns` one of the places (n, 2) of group g, so that they walk least together.
@@ -202,8 +232,12 @@ class GroupState:
 
     def rows(self, columns: Ints) -> PeopleArrays:
         """Returns copies of the arrays of the people in columns (N,), for the kernels."""
-        speed = self.arrays.speed[self.group_of]
-        self.everybody.pace[:] = np.where(self.alone, speed * self.share, np.minimum(speed, MAX_QUEUE_SPEED))
-        self.everybody.target[:] = np.where(self.alone[:, None], self.aims, self.targets)
+        speed, group = self.arrays.speed[self.group_of], self.group_of
         self.mode[:] = np.where(self.alone, ALONE, np.where((self.queue_of >= 0) | self.held, TO_TARGET, IN_GROUP))
+        self.everybody.pace[:] = np.where(self.alone, speed * self.share, np.minimum(speed, MAX_QUEUE_SPEED))
+        flocks = self.arrays.flock[group] & (self.mode == IN_GROUP)
+        if flocks.any():  # each at the own speed, together as fast as the group
+            total, count = (np.bincount(group, weights) for weights in (self.free_speed, None))
+            self.everybody.pace[flocks] = (speed * self.free_speed * count[group] / total[group])[flocks]
+        self.everybody.target[:] = np.where(self.alone[:, None], self.aims, self.targets)
         return PeopleArrays._make(values[columns] for values in self.everybody)

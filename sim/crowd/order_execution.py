@@ -300,7 +300,7 @@ class OrderExecution:
         pending.before, speeds = tuple(map(tuple, parts)), arrays.speed[parents]
         columns = sorted(c for part in parts for c in part)
         pending.after = (tuple(columns),)
-        g = groups.new_group(order.into, columns, float(np.mean([groups.spacing[p] for p in parents])))
+        g = groups.new_group(order.into, columns, parents)
         # No faster than the slowest parent: nobody runs to a merge.
         pace = float(speeds.min())
         r = self._rng("event", pending.index, 2)
@@ -340,7 +340,7 @@ class OrderExecution:
         for k, (part, goal) in enumerate(zip(order.parts, goals, strict=True)):
             own = [c for c, p in zip(columns, part_of, strict=True) if p == k]
             after.append(tuple(own))
-            g = groups.new_group(part.id, own, groups.spacing[parent])
+            g = groups.new_group(part.id, own, [parent])
             here = state[own, :2].mean(axis=0)
             via = [draw_point(p, self.placement, r) for p in part.via]
             groups.goals[g] = (goal, part.at_goal)

@@ -117,6 +117,7 @@ class EnteringGroup:
     via: list[Array]
     speed: float  # of the group, m/s
     spacing: float  # between neighbours, m
+    flock: bool  # True without formation
     # time of entry, s after the first recorded frame (0: there from the start of the warm-up; negative: in the warm-up)
     enter: float
     finish: str  # at the goal "stand", "leave" the scene or "walk" on
@@ -205,7 +206,8 @@ def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int],
     speed = own if own is not None else walking_speed([m.free_speed for m in members], crowd.slowdown_per_member)
     q = draws.rng("group", *key, 2)
     stops = draw_stops(spec.stops, size, lambda point: draw_point(point, draws.placement, q), q)
-    return EnteringGroup(name, -1, members, np.zeros(2), goal, via, speed, spacing, enter, spec.at_goal, stops)
+    flock = spec.formation == "none"
+    return EnteringGroup(name, -1, members, np.zeros(2), goal, via, speed, spacing, flock, enter, spec.at_goal, stops)
 
 
 def _colour(colours: tuple[str, ...] | None, r: np.random.Generator) -> tuple[float, ...]:

@@ -68,8 +68,7 @@ class World:
         self.entering: list[EnteringGroup] = draw_population(scenario, self.scene, seed, repeat)
         self.waiting = list(self.entering)
         self.members = [m for group in self.entering for m in group.members]
-        slowdown = scenario.crowd.slowdown_per_member
-        self.groups = GroupState(self.entering, groups_made(scenario), Navigator(self.scene), slowdown)
+        self.groups = GroupState(self.entering, groups_made(scenario), Navigator(self.scene), scenario.crowd)
         self.orders = OrderExecution(scenario, self.groups, script_placement(scenario, seed, repeat), seed, repeat)
         self.stops = Stops(self.entering, self.groups, self.scene)
         self.wayfinding = Wayfinding(self.groups)

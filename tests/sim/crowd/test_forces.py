@@ -69,10 +69,10 @@ def on_lattice(state: np.ndarray, width: float) -> np.ndarray:
 @pytest.mark.parametrize("n", [2, 48, 49])
 @pytest.mark.parametrize("arranged", ARRANGED)
 def test_pairs_equal_the_slow_twin(arranged: str, n: int) -> None:
-    state, people, _ = crowd(n, n, side=4 + n / 10)
+    state, people, groups = crowd(n, n, side=4 + n / 10)
     state = ARRANGED[arranged](state)
     out = np.zeros((n, 2))
-    _pairs(state, people.tag, out)
+    _pairs(state, people.tag, groups.boids, out)
     np.testing.assert_allclose(out, between_people(state, people.tag), atol=1e-9)
 
 
