@@ -1,10 +1,14 @@
 """How people walk here beside the literature and a recording, and how close replays are to their recordings.
 
     python -m benchmarks.realism walking [--seeds 0:40]
+    python -m benchmarks.realism flocking [--seeds 0:40]
     python -m benchmarks.realism recording [--data FOLDER] [--seeds 0:40] [--scenarios street …]
     python -m benchmarks.realism replays [--data FOLDER]
 
 walking: free speeds, speeds and shapes of groups that walk alone on open ground, measured from 4 s after the start.
+flocking: groups in rows and without formation, with all forces between members (Reynolds 1987) and without each, after
+5 to 10 s and 25 to 35 s: median distance to the nearest member, mean distance to the middle, length of the mean of the
+unit velocities (1: all walk the same way), spread of the velocities.
 recording: seq_hotel (BIWI) and scenarios of the catalogue, sampled at 2.5 frames/s with velocities by central
 differences. Printed for each: quantiles (5, 50, 95 %) of the speeds of people who walk (> 0.3 m/s) and of the
 closest approach, the least distance of two people of different groups who come within 3 m; then Wasserstein distances
@@ -18,7 +22,9 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.stats import wasserstein_distance
@@ -36,6 +42,7 @@ STEP = 0.4  # s
 WALKING = 0.3  # m/s
 MEETING = 3.0  # m
 QUANTILES = (0.05, 0.5, 0.95)
+FORCES = ("separation", "alignment", "cohesion")
 OPEN_GROUND = {"schema": 1, "duration": 9.0, "warmup": 4.0, "world": {"size": [60, 20]}}
 
 
@@ -123,6 +130,48 @@ def passes_between(pos: Array) -> bool:
     passing = [int(np.argmin(np.abs(x))) for x in away[..., 0].T]
     sides = np.array([away[t, k, 1] > 0 for k, t in enumerate(passing)])
     return bool(sides.any() and not sides.all())
+
+
+class FlockState(NamedTuple):
+    """Means of a group over members, times and seeds; distances in m."""
+
+    neighbour: float  # median distance to the nearest member
+    radius: float  # distance to the middle
+    polarisation: float  # length of the mean of the unit velocities
+    spread: float  # standard deviation of the velocities, m/s
+
+
+@cache
+def flock_walk(size: int, formation: str, seeds: range, off: str | None = None) -> tuple[FlockState, FlockState]:
+    """Returns the state of a group of `size` people on open ground after 5 to 10, and 25 to 35 s.
+
+    off: one of the FORCES, which does not act; None: all do.
+    """
+    group = {"id": "g", "size": size, "formation": formation, "start": [5, 10], "goal": [95, 10], "at_goal": "walk"}
+    table = {"schema": 1, "duration": 35.0, "warmup": 0.0, "world": {"size": [100, 20]}, "group": [group]}
+    scenario = Scenario.model_validate(table | ({"crowd": {off: 0.0}} if off else {}))
+    found = []
+    for states in (run(scenario, seed).states() for seed in seeds):
+        for ticks in (slice(50, 100), slice(250, 350)):
+            pos, vel = states.pos[ticks], states.vel[ticks]
+            apart = np.linalg.norm(pos[:, :, None] - pos[:, None], axis=-1) + np.diag(np.full(size, np.inf))
+            away = np.linalg.norm(pos - pos.mean(axis=1, keepdims=True), axis=-1)
+            same_way = np.linalg.norm((vel / np.linalg.norm(vel, axis=-1, keepdims=True)).mean(axis=1), axis=-1)
+            found.append([np.median(apart.min(axis=-1)), away.mean(), same_way.mean(), vel.std(axis=1).mean()])
+    early, late = np.reshape(found, (-1, 2, 4)).mean(axis=0)
+    return FlockState(*early), FlockState(*late)
+
+
+def flocking(seeds: range) -> None:
+    """Prints what each force between members does."""
+    head(["group", "forces", "nearest member, m", "to the middle, m", "polarisation", "spread of velocities, m/s"])
+    for formation, words in (("rows", "12 in rows"), ("none", "12 without formation")):
+        for off in (None, *FORCES):
+            states = flock_walk(12, formation, seeds, off)
+            cells = [
+                ", ".join(f"{x:.{digits}f}" for x in pair) for *pair, digits in zip(*states, (2, 2, 3, 3), strict=True)
+            ]
+            row([words, f"without {off}" if off else "all", *cells])
 
 
 def statistics(pos: Array, label: Ints) -> tuple[Array, Array, Array]:
@@ -266,13 +315,15 @@ def replays(data: Path) -> None:
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("mode", choices=["walking", "recording", "replays"])
+    parser.add_argument("mode", choices=["walking", "flocking", "recording", "replays"])
     add_seeds(parser, "0:40")
     parser.add_argument("--scenarios", nargs="*", default=names(), help="recording: scenarios to compare")
     add_data(parser)
     args = parser.parse_args()
     if args.mode == "walking":
         walking(args.seeds)
+    elif args.mode == "flocking":
+        flocking(args.seeds)
     elif args.mode == "recording":
         recording(args.data / HOTEL, args.scenarios, args.seeds)
     else:
