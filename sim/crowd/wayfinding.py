@@ -11,7 +11,6 @@ others people keep to the right while others come.
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
 
 from sim.clock import SCRIPT_RATE
 from sim.crowd.group_state import GroupState
@@ -40,7 +39,7 @@ class Wayfinding:
         state (P, 4): x, y, vx, vy by column, nan while absent.
         """
         groups, navigator = self.groups, self.groups.navigator
-        if not len(navigator.closed):
+        if not len(navigator.closed) or not groups.present.any():
             return False
         from sim.crowd.wayfinding_kernels import find_ways
 
@@ -52,12 +51,12 @@ class Wayfinding:
             arrays.length, arrays.current, arrays.filing, self.since, arrays.finish, navigator.nodes, navigator.far,
             navigator.closed, navigator.first, self.gate_state, 1 / SCRIPT_RATE, WAIT_TIME,
         )  # fmt: skip
-        if late or self.parted:
+        if (late or self.parted) and not round(t * SCRIPT_RATE) % SCRIPT_RATE:
             self._part_the_lost(t, state)
         return bool(changed)
 
     def _part_the_lost(self, t: float, state: Array) -> None:
-        """Marks who walks without the group from now on: those whom others of the group waited for in vain.
+        """Marks, once a second, who walks without the group: those whom others of the group waited for in vain.
 
         The people of a group who see each other within TOGETHER m remain together.
         """
@@ -65,14 +64,16 @@ class Wayfinding:
         groups.apart[:] = -1
         self.parted = False
         for g in np.flatnonzero(arrays.filing & (t - self.since >= WAIT_TIME)).tolist():
-            columns = [c for c in groups.members[g] if groups.present[c]]
+            columns = np.array([c for c in groups.members[g] if groups.present[c]], np.int64)
+            if len(columns) < 2:
+                continue
             pos = state[columns, :2]
             near = length(pos[:, None] - pos) < TOGETHER
             a, b = np.broadcast_arrays(pos[:, None], pos[None])
             near &= ~blocked(a, b, groups.navigator.walls)
-            _, part = connected_components(near, directed=False)
-            if part.max(initial=0):
-                self.parted = True
-                for k in range(1, part.max() + 1):
-                    some = [c for c, p in zip(columns, part, strict=True) if p == k]
-                    groups.apart[some] = min(some)
+            for _ in range(len(columns).bit_length()):
+                near = near @ near
+            first = columns[near.argmax(axis=1)]  # of those whom each sees, over others or not
+            lost = first != columns[0]
+            groups.apart[columns[lost]] = first[lost]
+            self.parted |= bool(lost.any())

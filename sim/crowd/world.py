@@ -190,6 +190,8 @@ class World:
 
     def _come_and_go(self, t: float, first: bool) -> None:
         """Removes people who leave at time t (s, negative in the warm-up), and adds groups that enter."""
+        if not len(self.columns) and not self.waiting:
+            return
         gone = self.groups.remove_leaving(self.columns)
         coming = [g for g in self.waiting if g.enter <= t or (first and g.enter == 0)]
         # A group waits while people stand at its place.
