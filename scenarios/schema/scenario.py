@@ -15,6 +15,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from scenarios.limits import FRAME_RATES, PEOPLE, PICTURE_SIZES, fits_picture
 from scenarios.schema.colours import Colours
+from scenarios.schema.looks import LooksSpec
 from scenarios.schema.sensor import Sensor
 
 # isort: off
@@ -474,6 +475,7 @@ class Scenario(Model):
     crowd: CrowdSpec = CrowdSpec()
     group: Annotated[tuple[GroupSpec, ...], Field(min_length=1)]
     event: tuple[ScriptOrder, ...] = ()
+    looks: LooksSpec | None = None
     draw: dict[Name, Distribution] | None = None
     # Not a key of files: the distributions and links in places of fixed values, by key.
     draws: SkipJsonSchema[dict[str, dict[str, Any]] | None] = None
@@ -490,10 +492,11 @@ def expand(pattern: str, names: list[str]) -> list[str]:
 
 
 class ObservationSpec(Model):
-    """Camera, sensor, light and picture, with the keys that they have in a scenario."""
+    """Camera, sensor, light, picture and looks, with the keys that they have in a scenario."""
 
     schema_: Literal[1] = Field(1, alias="schema")
     camera: CameraSpec = CameraSpec()
     sensor: Sensor = Sensor()
     light: Light = Light()
     picture: Picture = Picture()
+    looks: LooksSpec | None = None
