@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from scenarios.schema.looks import Distractors, LooksSpec
 
 WINDOW = 0.25  # s before and after: over which the speed is measured
-STANDS, BRISK, MOST_SWING = 0.2, 1.3, 1.25  # m/s, m/s: speeds of swing 0 and 1; swing at most
+STANDS, BRISK, MOST_SWING = 0.2, 1.4, 1.1  # m/s, m/s: speeds of swing 0 and 1; swing at most
 CANDIDATES = 24
 PEOPLE, PLACES = 1, 4  # keys of the random role "looks"; sim.render.people has 2 and 3
 WALKING = {"dog": (2 / 3, 1.2), "car": (1 / 2, 5.0)}  # share that moves, and how fast, m/s

@@ -62,8 +62,8 @@ class Scene(Frozen):
 class Looks(Frozen):
     """How P people look in T frames, and M things without ids: what people hold, and distractors (sim.scene.figure).
 
-    limbs: people have limbs. phase (T, P): of the gait, rad. swing (T, P): of the legs, 0 for standing, 1 at 1.3 m/s.
-    worn (P, 3): who wears what, in the order of WORN; (P, 0) if nobody wears anything. kind (M,): index in THINGS.
+    limbs: people have limbs. phase (T, P): of the gait, rad. swing (T, P): of the legs, 0 for standing, 1 at 1.4 m/s.
+    worn (P, 4): who wears what, in the order of WORN; (P, 0) if nobody wears anything. kind (M,): index in THINGS.
     number (M,): id of the person who holds it, or the distractor's among those of its kind, from 1. size (M,): scale.
     place (T, M, 2) m, turn (T, M) rad, step (T, M) rad: where things are, their heading, and the phase of their legs;
     nan while absent."""

@@ -321,10 +321,10 @@ class FrameTruth(Frozen):
 @dataclass(frozen=True, slots=True, eq=False)
 class PixelTruth(Frozen):
     """The truth of one frame's pixels; its N people are the frame's people, sorted by id. ids (H, W): person id (from
-    1), -2 for walls, pillars and things, 0 elsewhere. disparity (H, W): px, nan where the right camera does not see the point;
-    None if not computed. visible_px (N,): number of pixels that show the person; amodal_px (N,): number of pixels
-    inside the image that would show the person without occlusion. box (N, 4): left, top, width, height in px of the
-    visible pixels, nan without any. blob (N,): number, from 0, of the region of people who touch each other in the
+    1), -2 for walls, pillars and things, 0 elsewhere. disparity (H, W): px, nan where the right camera does not see the
+    point; None if not computed. visible_px (N,): number of pixels that show the person; amodal_px (N,): number of
+    pixels inside the image that would show the person without occlusion. box (N, 4): left, top, width, height in px of
+    the visible pixels, nan without any. blob (N,): number, from 0, of the region of people who touch each other in the
     image, -1 if hidden."""
 
     ids: Ints

@@ -16,6 +16,7 @@ class Carry(Model):
     of nobody's box or mask.
 
     Attributes:
+        coat: share with a coat over the thighs, worn
         bag: share with a bag at the side, worn
         rucksack: share with a rucksack, worn
         hat: share with a hat, worn
@@ -24,6 +25,7 @@ class Carry(Model):
         pram: share with a pram, held
     """
 
+    coat: Share = 0.0
     bag: Share = 0.0
     rucksack: Share = 0.0
     hat: Share = 0.0

@@ -3,9 +3,9 @@
 For a camera it computes: its rays in the axes of each ellipsoid, the outlines in the image (ellipses in px), nearest
 depths in m, and the range of rows and columns of the pixels that each person can cover. Clothes are colours and
 patterns, painted on texture pages (uint8, BGR), such as one for the body and one for the head; each person draws from
-random streams of their own, so one person more changes nobody else's clothes. In the light of the sun it computes where each
-person's shadow falls in the image (outlines, ranges of pixels, softness of the edge), and whether solid things such as
-walls hide the sun from feet, waist and head.
+random streams of their own, so one person more changes nobody else's clothes. In the light of the sun it computes where
+each person's shadow falls in the image (outlines, ranges of pixels, softness of the edge), and whether solid things
+such as walls hide the sun from feet, waist and head.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from sim.render.camera_view import OCCLUDER
 from sim.rng import rng
 from sim.scene.body import BODY, Ellipsoids, Outlines, RecordedBodies, outlines, packed_inverse, parts_of_people
 from sim.scene.camera import project
-from sim.scene.figure import HELD, SHAPES, TOPS, Parts
+from sim.scene.figure import SHAPES, THINGS, TOPS, Parts
 from sim.scene.figure import things as shapes_of_things
 from sim.scene.raycast import HIT_SLOTS, PixelRays, Solids
 from sim.types import Array, Camera, Ints, Looks, Motion
@@ -40,7 +40,8 @@ GOODS = np.array(
     [[30, 30, 32], [70, 45, 32], [48, 44, 140], [60, 110, 70], [150, 152, 155], [200, 200, 202], [45, 80, 120],
      [120, 80, 40], [50, 150, 190]], float,
 )  # fmt: skip
-DARK_GOODS = np.array([36.0, 36.0, 37.0])  # tyres, handles
+DARK_GOODS = np.array([[36.0, 36.0, 37.0]])  # tyres, handles
+GOODS_COLOURS, THING_COLOURS = 2, 3  # keys of the random role "looks"; sim.looks has 1 and 4
 COLOURS_OF_THING = 3  # pages MAIN, SECOND, DARK
 SLEEVE_ENDS = (-0.2, 0.0, 0.0, 0.45)  # height on the body where sleeves end: at the hand, or above the elbow
 LEVEL_SD, TINT_SD = 0.28, 0.06  # sd of the logarithm of a garment's brightness, and of each colour, against the palette
@@ -58,9 +59,9 @@ def _share(low: float, high: float) -> tuple[float, float]:
 def _pages(limbs: bool, worn: bool) -> tuple[list[tuple[int, float, float]], list[int]]:
     """Returns the kind and place of each page of a person, and which of them each of the person's parts has.
 
-    limbs: as of Looks. worn: whether two pages follow for what the person wears or holds, which no figure has.
+    limbs: as of Looks. worn: whether pages follow for what the person wears, the last two for goods.
     """
-    from sim.render.people_kernels import ARM_PAGE, BODY_PAGE, CARRIED, HEAD_PAGE, PLAIN_PAGE, SKIN
+    from sim.render.people_kernels import ARM_PAGE, BODY_PAGE, CARRIED, HEAD_PAGE, PLAIN_PAGE, SHIRT, SKIN
     from sim.render.people_kernels import SHOES as SHOE
 
     pages = [(BODY_PAGE, *WHOLE), (HEAD_PAGE, *WHOLE)]
@@ -74,8 +75,8 @@ def _pages(limbs: bool, worn: bool) -> tuple[list[tuple[int, float, float]], lis
         ]  # fmt: skip
         order = [*range(5), *np.repeat(range(5, 10), 2).tolist()]
     if worn:
-        pages += [(PLAIN_PAGE + CARRIED, *WHOLE), (PLAIN_PAGE + CARRIED + 1, *WHOLE)]
-        order += [len(pages) - 2, len(pages) - 2, len(pages) - 1]
+        order += (len(pages) + np.array([0, 1, 1, 2])).tolist()
+        pages += [(PLAIN_PAGE + row, *WHOLE) for row in (SHIRT, CARRIED, CARRIED + 1)]
     return pages, order
 
 
@@ -117,8 +118,8 @@ def clothing_atlas(
             if np.isfinite(given).all():
                 colours[rows] = given[::-1]
         if looks is not None:
-            extra = rng(seed, "looks", 2, k + 1, repeat=repeat)
-            colours = np.concatenate([colours, _goods(extra)])
+            extra = rng(seed, "looks", GOODS_COLOURS, k + 1, repeat=repeat)
+            colours = np.concatenate([colours, _goods(extra, GOODS)])
             if limbs:
                 # Limbs are drawn as such, not painted on the body.
                 style[4:] = 0.0, 2.0, extra.choice(SLEEVE_ENDS)
@@ -127,19 +128,18 @@ def clothing_atlas(
     for m in range(things):
         assert looks is not None
         kind, number, first_page = int(looks.kind[m]), int(looks.number[m]), people * len(wanted) + COLOURS_OF_THING * m
-        held = kind < len(HELD)
-        source = rng(seed, "looks", 2, number, repeat=repeat) if held else rng(seed, "looks", 3, kind, number, repeat=repeat)
-        colours = np.concatenate([_goods(source), DARK_GOODS[None]])
+        source = rng(seed, "looks", THING_COLOURS, kind, number, repeat=repeat)
+        colours = np.concatenate([_goods(source, HAIRS if THINGS[kind] == "dog" else GOODS), DARK_GOODS])
         for n in range(COLOURS_OF_THING):
-            paint(first_page + n, PLAIN_PAGE + n, *WHOLE, np.zeros(7), 77 + 5 * m, colours)
+            paint(first_page + n, PLAIN_PAGE + n, *WHOLE, np.zeros(7), number, colours)
     pages[:, :, ROUND] = pages[:, :, 0]
     return pages.reshape(len(pages), UP * (ROUND + 1) * 3)
 
 
-def _goods(source: np.random.Generator) -> Array:
-    """Returns two colours (2, 3) of goods, B, G, R."""
+def _goods(source: np.random.Generator, palette: Array) -> Array:
+    """Returns two colours (2, 3), B, G, R, near those of a palette (C, 3)."""
     level = np.exp(LEVEL_SD * source.normal(size=(2, 1))) * np.exp(TINT_SD * source.normal(size=(2, 3)))
-    return np.asarray(np.clip(GOODS[source.integers(len(GOODS), size=2)] * level, 12, 240))
+    return np.asarray(np.clip(palette[source.integers(len(palette), size=2)] * level, 12, 240))
 
 
 class ImageOutlines(NamedTuple):
@@ -153,7 +153,7 @@ class ImageOutlines(NamedTuple):
 
 
 class PeopleInView(NamedTuple):
-    """N people, or things, of one or more frames as one camera sees them; the axis of length K is that of Ellipsoids."""
+    """N people, or things, of one or more frames as a camera sees them; the axis of length K is that of Ellipsoids."""
 
     id: Ints  # (N,) person id = column of the Motion (from 0) + 1; OCCLUDER for things
     page: Ints  # (N, K) row of the atlas

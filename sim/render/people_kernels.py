@@ -2,8 +2,8 @@
 
 The tests hold a slow twin of the drawing.
 
-A page says which garment and which shade is where on a body, head or limb; a point of these is given by across (-1 left … 1
-right), along (1 front, -1 back) and up (-1 … 1).
+A page says which garment and which shade is where on a body, head or limb; a point of these is given by across (-1 left
+… 1 right), along (1 front, -1 back) and up (-1 … 1).
 
 People are drawn row by row of their outlines. A body part is a ball of radius 1 in its own axes (across, along, up,
 each over its half axis). There the ray of pixel (u, v) is q = P (u, v, 1) + t D (u, v, 1), with P, D (3, 3) the
@@ -138,8 +138,8 @@ def _texture_and_light(  # type: ignore[no-untyped-def]
     """Sets where on a texture page the points at depths t (many,) are, and how they are lit.
 
     place (many,): index of the lower left of four texels; across, up (many,): how far beyond it; light (many,):
-    brightness times UNIT. half (3,) m: half axes. sun (3,): in own axes. sunlit (3,): columns LOWER …. Float32, exact to
-    1e-4 of a page.
+    brightness times UNIT. half (3,) m: half axes. sun (3,): in own axes. sunlit (3,): columns LOWER …. Float32, exact
+    to 1e-4 of a page.
     """
     f = np.float32
     px0, px1 = f(ray[X, P_AT_0]), f(ray[X, P_PER_COLUMN])

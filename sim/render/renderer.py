@@ -213,7 +213,7 @@ class Renderer:
         return (index - 1) / self.motion.fps
 
     def _shown(self, view: CameraView, index: int) -> list[Shown]:
-        """Returns the people of the batch of frame `index` as a view sees them, and then the things, if there are any."""
+        """Returns the people of the batch of frame `index` as a view sees them, then the things, if there are any."""
         first = index - (index - 1) % FRAMES
         if first != self._first:
             self._first, self._bodies = first, recorded_bodies(self.motion, first, first + FRAMES)

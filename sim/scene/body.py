@@ -2,11 +2,11 @@
 
 A person of height h is two upright ellipsoids, body and head (BODY, HEAD), turned by the heading; with `Motion.looks`
 it can have limbs and what is worn in place of them (sim.scene.figure): K ellipsoids, of which the first is the body or
-torso and the second the head. Outlines and boxes are those of all K. What people hold has rows of its own. An ellipsoid with
-centre c and shape S = A diag(a²) Aᵀ (half axes a, axis directions the columns of A), in camera coordinates, is the dual
-quadric [[S - ccᵀ, -c], [-cᵀ, -1]]. A pinhole camera with matrix K (focal lengths, image centre) maps it to the dual
-conic C* = K (S - c cᵀ) Kᵀ: an ellipse with centre m = (C*₁₃, C*₂₃)/C*₃₃ and shape E = m mᵀ - C*₁..₂/C*₃₃ (Hartley &
-Zisserman, Multiple View Geometry, 8.3). Its points u obey (u - m)ᵀ E⁻¹ (u - m) <= 1, and its box is m ± sqrt(diag E).
+torso and the second the head. Outlines and boxes are those of all K. What people hold has rows of its own. An ellipsoid
+with centre c and shape S = A diag(a²) Aᵀ (half axes a, axis directions the columns of A), in camera coordinates, is the
+dual quadric [[S - ccᵀ, -c], [-cᵀ, -1]]. A pinhole camera with matrix K (focal lengths, image centre) maps it to the
+dual conic C* = K (S - c cᵀ) Kᵀ: an ellipse with centre m = (C*₁₃, C*₂₃)/C*₃₃ and shape E = m mᵀ - C*₁..₂/C*₃₃ (Hartley
+& Zisserman, Multiple View Geometry, 8.3). Its points u obey (u - m)ᵀ E⁻¹ (u - m) <= 1, and its box is m ± sqrt(diag E).
 All outlines are closed-form; nothing is sampled.
 """
 
@@ -56,8 +56,8 @@ class Ellipsoids:
 class Outlines:
     """Silhouettes of N people in an image, as ellipses (u - centre)ᵀ shape⁻¹ (u - centre) <= 1, K each.
 
-    centre (N, K, 2) px and shape (N, K, 2, 2) px²; the second axis is that of Ellipsoids. An ellipse is nan if its ellipsoid is
-    not wholly in front of the camera.
+    centre (N, K, 2) px and shape (N, K, 2, 2) px²; the second axis is that of Ellipsoids. An ellipse is nan if its
+    ellipsoid is not wholly in front of the camera.
     """
 
     centre: Array

@@ -5,7 +5,7 @@ ground. A part is turned only by its pitch, about the axis across: at a positive
 
 The gait: a leg has phase p, the other one p + pi. The thigh has the pitch swing (STEP cos p + LEAN), and the knee is
 bent by swing (BENT + KNEE max(0, -sin p)²), most while the thigh moves forwards. The arm of a side moves against its
-leg. The hip sinks until the lower foot is on the ground. swing is 0 for a person who stands and 1 at 1.3 m/s.
+leg. The hip sinks until the lower foot is on the ground. swing is 0 for a person who stands and 1 at 1.4 m/s.
 """
 
 from __future__ import annotations
@@ -25,29 +25,30 @@ SIDES = np.array([-1.0, 1.0])  # left, right
 # Upright parts of the trunk, one row each: centre along and up, then half axes across, along and up; shares of height.
 TRUNK = np.array(
     [
-        [0.0, 0.68, 0.105, 0.075, 0.18],  # torso
+        [0.0, 0.67, 0.110, 0.078, 0.19],  # torso
         [0.005, HEAD_SHARE, 0.045, 0.057, 0.07],  # head
         [0.0, 0.795, 0.125, 0.055, 0.05],  # shoulders
-        [0.0, 0.52, 0.092, 0.07, 0.09],  # hips
+        [0.0, 0.52, 0.098, 0.074, 0.10],  # hips
         [0.0, 0.865, 0.032, 0.036, 0.045],  # neck
     ]
 )
 # Pairs of limbs, left and right: half axes across, along and up, shares of height.
 LIMBS = np.array(
     [
-        [0.050, 0.056, 0.150],  # thighs
-        [0.033, 0.038, 0.135],  # shins
-        [0.025, 0.068, 0.024],  # feet
-        [0.029, 0.032, 0.105],  # upper arms
-        [0.023, 0.025, 0.125],  # forearms with hands
+        [0.054, 0.060, 0.160],  # thighs
+        [0.040, 0.044, 0.150],  # shins
+        [0.026, 0.068, 0.025],  # feet
+        [0.033, 0.036, 0.110],  # upper arms
+        [0.027, 0.029, 0.130],  # forearms with hands
     ]
 )
 LIMB_PARTS = len(TRUNK) + 2 * len(LIMBS)
 
-WORN = ("bag", "rucksack", "hat")
+WORN = ("coat", "bag", "rucksack", "hat")
 # Rows of WORN: centre across, along, up, half axes; shares of height.
 WORN_SHAPES = np.array(
     [
+        [0.0, 0.0, 0.49, 0.118, 0.096, 0.21],
         [0.165, 0.01, 0.46, 0.035, 0.095, 0.075],
         [0.0, -0.115, 0.70, 0.085, 0.062, 0.125],
         [0.0, 0.008, 0.975, 0.060, 0.078, 0.028],
@@ -145,7 +146,7 @@ TOPS = (SHAPES[..., 2] + SHAPES[..., 5]).max(axis=1)  # (kinds,) m: heights
 def limbs(height: Array, width: Array, depth: Array, phase: Array, swing: Array) -> Parts:
     """Returns the LIMB_PARTS parts of N people: those of TRUNK, then left and right ones of LIMBS.
 
-    height, width, depth (N,): m. phase (N,): of the gait, rad. swing (N,): 0 standing, 1 at 1.3 m/s.
+    height, width, depth (N,): m. phase (N,): of the gait, rad. swing (N,): 0 standing, 1 at 1.4 m/s.
     """
     leg, beat = phase[:, None] + np.array([0.0, np.pi]), swing[:, None]
     thigh = beat * (STEP * cos(leg) + LEAN)
@@ -185,7 +186,7 @@ def limbs(height: Array, width: Array, depth: Array, phase: Array, swing: Array)
 
 
 def with_worn(parts: Parts, height: Array, worn: Bools) -> Parts:
-    """Returns the parts of N people and, behind them, those of what they wear, (N, 3) in the order of WORN.
+    """Returns the parts of N people and, behind them, those of what they wear, (N, 4) in the order of WORN.
 
     What somebody does not wear is a ball of 1 mm within the first part.
     """
@@ -193,8 +194,8 @@ def with_worn(parts: Parts, height: Array, worn: Bools) -> Parts:
     shape[..., 2] += parts.offset[:, 1:2, 2] - HEAD_SHARE * height[:, None]  # sinks with the head
     offset = np.where(worn[..., None], shape[..., :3], inner)
     half = np.where(worn[..., None], shape[..., 3:], 0.001)
-    joined = (np.concatenate(pair, axis=1) for pair in ((parts.offset, offset), (parts.half, half)))
-    return Parts(*joined, np.concatenate([parts.pitch, np.zeros(worn.shape)], axis=1))
+    added = Parts(offset, half, np.zeros(worn.shape))
+    return Parts(*(np.concatenate(pair, axis=1) for pair in zip(parts, added, strict=True)))
 
 
 def things(kind: Ints, size: Array, phase: Array) -> Parts:

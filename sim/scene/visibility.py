@@ -1,10 +1,10 @@
 """How much of each person a camera sees, computed from geometry alone, whether or not images are drawn.
 
-Each silhouette (body and head or limbs, `sim.scene.body`) is sampled on a grid over its amodal box. A sample is visible if it
-meets three conditions: it lies in the image; no nearer silhouette covers it; its line of sight meets no wall, pillar,
-step or thing first. `sim.scene.body.occlusion_distance` orders people from near to far. A wall hides people beyond its line. A
-pillar hides people further away than the tangent to it. Stairs hide if the ray meets a step before the upright plane
-through the person that faces the camera. Seen from above, walls, pillars and stairs hide nobody.
+Each silhouette (body and head or limbs, `sim.scene.body`) is sampled on a grid over its amodal box. A sample is visible
+if it meets three conditions: it lies in the image; no nearer silhouette covers it; its line of sight meets no wall,
+pillar, step or thing first. `sim.scene.body.occlusion_distance` orders people from near to far. A wall hides people
+beyond its line. A pillar hides people further away than the tangent to it. Stairs hide if the ray meets a step before
+the upright plane through the person that faces the camera. Seen from above, walls, pillars and stairs hide nobody.
 Things (an umbrella, a car) hide if the ray through the sample meets one of their ellipsoids before all of the person's.
 
 Who is visible in a recording follows from the boxes alone: each is taken for an upright person of `sim.scene.body`
@@ -18,8 +18,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.scene import body
 from sim.elementary import inverse_3x3
+from sim.scene import body
 from sim.scene.body import Ellipsoids, Outlines, RecordedBodies
 from sim.scene.raycast import PixelRays, only_flights, pixel_rays, solids_of, unprojection
 from sim.types import Array, Camera, Ints, Scene, Truth
@@ -76,7 +76,8 @@ def measure_visibility(
     visibility, truncation, visible_box = sample_visibility(
         frame_starts(frame), box, np.ascontiguousarray(ellipses.centre), body.packed_inverse(ellipses.shape),
         body.occlusion_distance(camera, pos3, height), pos3[:, :2].copy(), np.array(camera.image, dtype=float),
-        np.array(camera.position, dtype=float), unprojection(camera), solids if hides else None, only_flights(solids.flights) if climbs else None,
+        np.array(camera.position, dtype=float), unprojection(camera), solids if hides else None,
+        only_flights(solids.flights) if climbs else None,
         None if things is None else _hiders(camera, frame, shapes, things),
     )  # fmt: skip
     return BodyVisibility(box, visibility, truncation, visible_box)

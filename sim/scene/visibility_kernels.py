@@ -75,10 +75,10 @@ def _behind_a_thing(i, u, v, near, n, things, o, d):  # type: ignore[no-untyped-
     at_pixel(things.rays.origin, u, v, o)
     at_pixel(things.rays.direction, u, v, d)
     own = _first_part(o, d, things.own_centre[i], things.own_inverse[i])
+    first = np.inf
     for k in range(n):
-        if _first_part(o, d, things.centre[near[k]], things.inverse[near[k]]) < own:
-            return True
-    return False
+        first = min(first, _first_part(o, d, things.centre[near[k]], things.inverse[near[k]]))
+    return first < own
 
 
 @njit(cache=True)
