@@ -2,7 +2,7 @@
 
 docs/reference/scenario-files.md has the descriptions of the fields. A class whose subject has another class in `sim`
 ends in Spec. Where a value may be a number or a distribution (scenarios.schema.values), it is drawn once for each seed.
-`flockscope replay` reads a file of the tables camera, sensor, light and picture alone (ObservationSpec).
+`flockscope replay` reads a file of the tables camera, sensor, light, picture and looks alone (ObservationSpec).
 """
 
 from __future__ import annotations

@@ -17,7 +17,8 @@ import numpy as np
 from sim.elementary import cos, sin
 from sim.types import Array, Bools, Ints
 
-THIGH, SHIN, ANKLE = 0.245, 0.225, 0.045  # lengths, and height of the ankle; shares of the person's height
+# Lengths, and heights of ankle and shoulder; shares of the person's height.
+THIGH, SHIN, ANKLE, SHOULDER = 0.245, 0.225, 0.045, 0.79
 STEP, LEAN, BENT, KNEE = 0.44, 0.05, 0.1, 0.95  # rad, of the gait
 HEAD_SHARE = 0.93  # height of the head's centre, share of the person's height
 SIDES = np.array([-1.0, 1.0])  # left, right
@@ -154,26 +155,25 @@ def limbs(height: Array, width: Array, depth: Array, phase: Array, swing: Array)
     shin = thigh - beat * (BENT + KNEE * back * back)
     arm = -0.9 * thigh
     forearm = arm + 0.12 + 0.35 * beat
-    hip = ANKLE + (THIGH * cos(thigh) + SHIN * cos(shin)).max(axis=1)[:, None]
-    drop = THIGH + SHIN + ANKLE - hip
+    toe = 0.7 * shin  # pitch of the foot
 
     def joint(along: Array, up: Array, length: float, pitch: Array) -> tuple[Array, Array]:
         return along + length * sin(pitch), up - length * cos(pitch)
 
     none = np.zeros_like(leg)
-    knee = joint(none, hip, THIGH, thigh)
+    hip, shoulder = (none, none + THIGH + SHIN + ANKLE), (none, none + SHOULDER)
+    knee, elbow = joint(*hip, THIGH, thigh), joint(*shoulder, 0.18, arm)
     ankle = joint(*knee, SHIN, shin)
-    shoulder = 0.79 - drop
-    elbow = joint(none, shoulder, 0.18, arm)
+    foot = joint(ankle[0] + 0.03 * cos(toe), ankle[1] + 0.03 * sin(toe), 0.02, toe)
     centres = [
-        joint(none, hip, 0.45 * THIGH, thigh), joint(*knee, 0.5 * SHIN, shin),
-        joint(ankle[0] + 0.03 * cos(shin), ankle[1] + 0.03 * sin(shin), 0.02, shin),
-        joint(none, shoulder, 0.085, arm), joint(*elbow, 0.1, forearm),
+        joint(*hip, 0.45 * THIGH, thigh), joint(*knee, 0.5 * SHIN, shin), foot, joint(*shoulder, 0.085, arm),
+        joint(*elbow, 0.1, forearm),
     ]  # fmt: skip
-    n, offset = len(height), np.zeros((len(height), LIMB_PARTS, 3))
-    half, pitch = np.empty_like(offset), np.zeros((n, LIMB_PARTS))
-    trunk = len(TRUNK)
-    offset[:, :trunk, 1], offset[:, :trunk, 2], half[:, :trunk] = TRUNK[:, 0], TRUNK[:, 1] - drop, TRUNK[:, 2:]
+    _, long, thick = LIMBS[2]
+    sole = foot[1] - np.sqrt((long * sin(toe)) ** 2 + (thick * cos(toe)) ** 2)
+    n, trunk = len(height), len(TRUNK)
+    offset, half, pitch = np.zeros((n, LIMB_PARTS, 3)), np.empty((n, LIMB_PARTS, 3)), np.zeros((n, LIMB_PARTS))
+    offset[:, :trunk, 1:], half[:, :trunk] = TRUNK[:, :2], TRUNK[:, 2:]
     broad, deep = (width / (0.27 * height))[:, None], (depth / (0.16 * height))[:, None]
     half[:, [0, 2, 3], 0] *= broad
     half[:, [0, 2, 3], 1] *= deep
@@ -181,7 +181,8 @@ def limbs(height: Array, width: Array, depth: Array, phase: Array, swing: Array)
         at = slice(trunk + 2 * k, trunk + 2 * k + 2)
         offset[:, at, 0] = SIDES * (0.052 if k < 3 else 0.125 * broad + 0.006 * (k - 3))
         offset[:, at, 1], offset[:, at, 2], half[:, at] = along, up, LIMBS[k]
-        pitch[:, at] = (thigh, shin, 0.7 * shin, arm, forearm)[k]
+        pitch[:, at] = (thigh, shin, toe, arm, forearm)[k]
+    offset[..., 2] -= sole.min(axis=1)[:, None]
     return Parts(offset * height[:, None, None], half * height[:, None, None], pitch)
 
 
