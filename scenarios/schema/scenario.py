@@ -1,8 +1,6 @@
-"""The keys of a scenario file, as frozen pydantic models. SI units; angles in degrees.
+"""The keys of a scenario file, as frozen pydantic models; a class with a namesake in `sim` ends in Spec. SI; degrees.
 
-docs/reference/scenario-files.md has the descriptions of the fields. A class whose subject has another class in `sim`
-ends in Spec. Where a value may be a number or a distribution (scenarios.schema.values), it is drawn once for each seed.
-`flockscope replay` reads a file of the tables camera, sensor, light, picture and looks alone (ObservationSpec).
+Where a value may be a number or a distribution (scenarios.schema.values), it is drawn once for each seed.
 """
 
 from __future__ import annotations
@@ -492,7 +490,7 @@ def expand(pattern: str, names: list[str]) -> list[str]:
 
 
 class ObservationSpec(Model):
-    """Camera, sensor, light, picture and looks, with the keys that they have in a scenario."""
+    """Camera, sensor, light, picture and looks, with the keys that they have in a scenario; for `flockscope replay`."""
 
     schema_: Literal[1] = Field(1, alias="schema")
     camera: CameraSpec = CameraSpec()

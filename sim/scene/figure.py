@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from sim.elementary import cos, sin
+from sim.elementary import cos, length, sin
 from sim.types import Array, Bools, Ints
 
 # Lengths, and heights of ankle and shoulder; shares of the person's height.
@@ -157,8 +157,8 @@ def limbs(height: Array, width: Array, depth: Array, phase: Array, swing: Array)
     forearm = arm + 0.12 + 0.35 * beat
     toe = 0.7 * shin  # pitch of the foot
 
-    def joint(along: Array, up: Array, length: float, pitch: Array) -> tuple[Array, Array]:
-        return along + length * sin(pitch), up - length * cos(pitch)
+    def joint(along: Array, up: Array, reach: float, pitch: Array) -> tuple[Array, Array]:
+        return along + reach * sin(pitch), up - reach * cos(pitch)
 
     none = np.zeros_like(leg)
     hip, shoulder = (none, none + THIGH + SHIN + ANKLE), (none, none + SHOULDER)
@@ -170,7 +170,7 @@ def limbs(height: Array, width: Array, depth: Array, phase: Array, swing: Array)
         joint(*elbow, 0.1, forearm),
     ]  # fmt: skip
     _, long, thick = LIMBS[2]
-    sole = foot[1] - np.sqrt((long * sin(toe)) ** 2 + (thick * cos(toe)) ** 2)
+    sole = foot[1] - length(np.stack([long * sin(toe), thick * cos(toe)], axis=-1))
     n, trunk = len(height), len(TRUNK)
     offset, half, pitch = np.zeros((n, LIMB_PARTS, 3)), np.empty((n, LIMB_PARTS, 3)), np.zeros((n, LIMB_PARTS))
     offset[:, :trunk, 1:], half[:, :trunk] = TRUNK[:, :2], TRUNK[:, 2:]
