@@ -60,7 +60,10 @@ def test_a_pitched_part_ends_where_its_pitch_says(heading: float, pitch: float) 
     centre = np.array([*(np.array([3.0, 4.0]) + 0.1 * right + 0.2 * along), 1.4])
     assert shapes.centre[0, 0] == pytest.approx(centre)
     down = 0.4 * np.array([*(np.sin(pitch) * along), -np.cos(pitch)])
-    assert down @ np.linalg.inv(shapes.shape[0, 0]) @ down == pytest.approx(1.0)
+    ahead = 0.1 * np.array([*(np.cos(pitch) * along), np.sin(pitch)])
+    for end in (down, ahead):
+        assert end @ np.linalg.inv(shapes.shape[0, 0]) @ end == pytest.approx(1.0)
+    assert np.linalg.det(shapes.shape[0, 0]) == pytest.approx((0.05 * 0.1 * 0.4) ** 2)
 
 
 def test_what_is_not_worn_is_inside_the_torso() -> None:
