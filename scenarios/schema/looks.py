@@ -46,6 +46,7 @@ class Distractors(Model):
         bollard: bollards
         bin: litter bins
         poster: boards with a poster
+        sign: signs on poles
     """
 
     dog: Count = 0.0
@@ -54,6 +55,7 @@ class Distractors(Model):
     bollard: Count = 0.0
     bin: Count = 0.0
     poster: Count = 0.0
+    sign: Count = 0.0
 
 
 class LooksSpec(Model):

@@ -56,17 +56,14 @@ def _share(low: float, high: float) -> tuple[float, float]:
     return (low + high) / (2 * BODY.up) - 1, (high - low) / (2 * BODY.up)
 
 
-def _pages(limbs: bool, worn: bool) -> tuple[list[tuple[int, float, float]], list[int]]:
-    """Returns the kind and place of each page of a person, and which of them each of the person's parts has.
-
-    limbs: as of Looks. worn: whether pages follow for what the person wears, the last two for goods.
-    """
+def _pages(looks: Looks | None) -> tuple[list[tuple[int, float, float]], list[int]]:
+    """Returns the kind and place of each page of a person, and which of them each of the person's parts has."""
     from sim.render.people_kernels import ARM_PAGE, BODY_PAGE, CARRIED, HEAD_PAGE, PLAIN_PAGE, SHIRT, SKIN
     from sim.render.people_kernels import SHOES as SHOE
 
     pages = [(BODY_PAGE, *WHOLE), (HEAD_PAGE, *WHOLE)]
     order = [0, 1]
-    if limbs:
+    if looks is not None and looks.limbs:
         pages = [
             (BODY_PAGE, *_share(0.50, 0.86)), (HEAD_PAGE, *WHOLE), (BODY_PAGE, *_share(0.745, 0.845)),
             (BODY_PAGE, *_share(0.43, 0.61)), (PLAIN_PAGE + SKIN, *WHOLE), (BODY_PAGE, *_share(0.24, 0.54)),
@@ -74,7 +71,7 @@ def _pages(limbs: bool, worn: bool) -> tuple[list[tuple[int, float, float]], lis
             (ARM_PAGE, *_share(0.40, 0.65)),
         ]  # fmt: skip
         order = [*range(5), *np.repeat(range(5, 10), 2).tolist()]
-    if worn:
+    if looks is not None and looks.worn.size:
         order += (len(pages) + np.array([0, 1, 1, 2])).tolist()
         pages += [(PLAIN_PAGE + row, *WHOLE) for row in (SHIRT, CARRIED, CARRIED + 1)]
     return pages, order
@@ -93,7 +90,7 @@ def clothing_atlas(
     from sim.render.people_kernels import TROUSERS as LEGS
 
     limbs = looks is not None and looks.limbs
-    wanted, drawn = _pages(limbs, looks is not None)[0], np.empty((UP, ROUND, 3))
+    wanted, drawn = _pages(looks)[0], np.empty((UP, ROUND, 3))
     things = 0 if looks is None else len(looks.kind)
     pages = np.empty((people * len(wanted) + COLOURS_OF_THING * things, UP, ROUND + 1, 3), np.uint8)
 
@@ -176,8 +173,8 @@ def people_in_view(
     """Returns N people as a camera sees them. rays: those of the camera. sun (3,): unit vector to the sun."""
     t, p, looks = people.frame - 1, people.id - 1, motion.looks
     parts = parts_of_people(motion, t, p)
-    pages, order = _pages(looks is not None and looks.limbs, looks is not None)
-    page = len(pages) * p[:, None] + np.array(order[: parts.pitch.shape[1]])
+    pages, order = _pages(looks)
+    page = len(pages) * p[:, None] + np.array(order)
     lit = sunlit_shares(solids, people.pos3, motion.height[p], sun)
     if looks is None:
         lit = np.stack([lit, np.repeat(lit[:, 2:], 3, axis=1)], axis=1)
@@ -192,7 +189,7 @@ def things_in_view(
     """Returns N things as a camera sees them, as `people_in_view` does people."""
     t, m, looks = things.frame - 1, things.id - 1, motion.looks
     assert looks is not None
-    first = len(_pages(looks.limbs, worn=True)[0]) * motion.present.shape[1]
+    first = len(_pages(looks)[0]) * motion.present.shape[1]
     kind, tall = looks.kind[m], looks.size[m] * TOPS[looks.kind[m]]
     parts = shapes_of_things(kind, looks.size[m], looks.step[t, m])
     page = first + COLOURS_OF_THING * m[:, None] + SHAPES[kind][..., -1].astype(np.int64)

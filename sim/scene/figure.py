@@ -67,7 +67,7 @@ class Parts(NamedTuple):
 
 MAIN, SECOND, DARK = range(3)  # pages of a thing's colours
 HELD = ("umbrella", "trolley", "pram")
-DISTRACTORS = ("dog", "bicycle", "car", "bollard", "bin", "poster")
+DISTRACTORS = ("dog", "bicycle", "car", "bollard", "bin", "poster", "sign")
 THINGS = (*HELD, *DISTRACTORS)
 # Of each part: centre across, along, up; half axes across, along, up, m; pitch, rad; swing, rad; page of colour.
 _SHAPES: dict[str, list[tuple[float, ...]]] = {
@@ -133,6 +133,10 @@ _SHAPES: dict[str, list[tuple[float, ...]]] = {
         (0.0, 0.02, 1.20, 0.30, 0.03, 0.42, 0, 0, SECOND),
         (-0.25, 0.0, 0.25, 0.04, 0.04, 0.28, 0, 0, DARK),
         (0.25, 0.0, 0.25, 0.04, 0.04, 0.28, 0, 0, DARK),
+    ],
+    "sign": [
+        (0.0, 0.0, 1.50, 0.045, 0.045, 1.56, 0, 0, DARK),
+        (0.0, 0.05, 2.35, 0.32, 0.02, 0.42, 0, 0, MAIN),
     ],
 }
 THING_PARTS = max(map(len, _SHAPES.values()))
