@@ -50,7 +50,7 @@ ASKED: dict[str, Callable[[Renderer], Callable[[int], object]]] = {
     "empty": lambda s: lambda i: s.background(i % 50),
 }
 RENDERING: Parts = {
-    "places, outlines": [(renderer.Renderer, "_people")],
+    "places, outlines": [(renderer.Renderer, "_shown")],
     "shadows": [(people_kernels, "draw_shadows")],
     "people": [(people_kernels, "draw_people")],
     "blur, light, noise": [(renderer.Renderer, "_finish")],

@@ -132,4 +132,5 @@ def every_nth(motion: Motion, n: int) -> Motion:
         return None if time is None else times.frame_of(round(time * SCRIPT_RATE))
 
     orders = tuple(replace(order, fired=fired(order.time)) for order in motion.orders)
-    return motion.replace(fps=times.fps, orders=orders, measured=motion.states(), **kept)
+    looks = None if motion.looks is None else motion.looks.every(n)
+    return motion.replace(fps=times.fps, orders=orders, measured=motion.states(), looks=looks, **kept)

@@ -7,7 +7,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from sim.arrays import Array, Frozen
+from sim.arrays import Array, Bools, Frozen, Ints
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,6 +56,32 @@ class Scene(Frozen):
             np.array(world.service, float).reshape(-1, 2),
             tuple(map(Stairs.of, world.stairs)), world.wall_height, world.pillar_height,
         )  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Looks(Frozen):
+    """How P people look in T frames, and M things without ids: what people hold, and distractors (sim.scene.figure).
+
+    limbs: people have limbs. phase (T, P): of the gait, rad. swing (T, P): of the legs, 0 for standing, 1 at 1.4 m/s.
+    worn (P, 4): who wears what, in the order of WORN; (P, 0) if nobody wears anything. kind (M,): index in THINGS.
+    number (M,): id of the person who holds it, or the distractor's among those of its kind, from 1. size (M,): scale.
+    place (T, M, 2) m, turn (T, M) rad, step (T, M) rad: where things are, their heading, and the phase of their legs;
+    nan while absent."""
+
+    limbs: bool
+    phase: Array
+    swing: Array
+    worn: Bools
+    kind: Ints
+    number: Ints
+    size: Array
+    place: Array
+    turn: Array
+    step: Array
+
+    def every(self, n: int) -> Looks:
+        """Returns the looks in the frames 1, 1 + n, 1 + 2 n, … only."""
+        return self.replace(**{k: getattr(self, k)[::n] for k in ("phase", "swing", "place", "turn", "step")})
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # Every stored hash depends on their numbers: add at the end, never change one.
 ROLES = (
     "layout", "group", "person", "event", "service", "gait", "detect", "clutter", "texture", "light", "noise",
-    "tracker", "camera", "wind", "label", "delivery", "draw",
+    "tracker", "camera", "wind", "label", "delivery", "draw", "looks",
 )  # fmt: skip
 ROLE = {name: number for number, name in enumerate(ROLES)}
 BELOW_1 = 1.0 - 2.0**-53

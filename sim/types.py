@@ -19,6 +19,7 @@ from sim.arrays import Image as Image
 from sim.arrays import Ints as Ints
 from sim.arrays import no_ids as no_ids
 from sim.place import Camera as Camera
+from sim.place import Looks as Looks
 from sim.place import Scene as Scene
 from sim.place import Stairs as Stairs
 from sim.stuck import Immobile, NeverArrives
@@ -238,7 +239,8 @@ class Motion(Frozen):
     of the body, m. free_speed (P,): walking speed alone, m/s. orders: of the script. measured: states from which the
     truth is measured; None: the frames themselves. never_arrive: groups that do not reach their goal. immobile:
     people who stood still on the way. unfired: id of each order that never fired, and the reason in words. clothes (P,
-    2, 3): red, green, blue of upper garment and trousers, grey levels; nan where any; None: all nan."""
+    2, 3): red, green, blue of upper garment and trousers, grey levels; nan where any; None: all nan. looks: None if
+    everybody is body and head only, and there are no things."""
 
     name: str
     seed: int
@@ -260,6 +262,7 @@ class Motion(Frozen):
     immobile: tuple[Immobile, ...] = ()
     unfired: tuple[tuple[str, str], ...] = ()
     clothes: Array | None = None
+    looks: Looks | None = None
 
     def states(self) -> States:
         """Returns the states from which the truth is measured."""
@@ -318,10 +321,10 @@ class FrameTruth(Frozen):
 @dataclass(frozen=True, slots=True, eq=False)
 class PixelTruth(Frozen):
     """The truth of one frame's pixels; its N people are the frame's people, sorted by id. ids (H, W): person id (from
-    1), -2 for walls and pillars, 0 elsewhere. disparity (H, W): px, nan where the right camera does not see the point;
-    None if not computed. visible_px (N,): number of pixels that show the person; amodal_px (N,): number of pixels
-    inside the image that would show the person without occlusion. box (N, 4): left, top, width, height in px of the
-    visible pixels, nan without any. blob (N,): number, from 0, of the region of people who touch each other in the
+    1), -2 for walls, pillars and things, 0 elsewhere. disparity (H, W): px, nan where the right camera does not see the
+    point; None if not computed. visible_px (N,): number of pixels that show the person; amodal_px (N,): number of
+    pixels inside the image that would show the person without occlusion. box (N, 4): left, top, width, height in px of
+    the visible pixels, nan without any. blob (N,): number, from 0, of the region of people who touch each other in the
     image, -1 if hidden."""
 
     ids: Ints

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.scene.body import ellipsoids
+from sim.scene.body import ellipsoids, recorded_bodies, recorded_things
 from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Camera, Ints, Motion, Scene
 
@@ -94,7 +94,12 @@ def cylinder(o: Array, d: Array, axis: Array, r: float, height: float) -> Array:
 
 
 def bodies(motion: Motion, index: int) -> list[tuple[int, Array, Array]]:
-    """(id, centre, shape) of each part of each person."""
+    """(id, centre, shape) of each part of each person, and of each thing (id -2)."""
+    if motion.looks is not None:
+        people, things = (found(motion, index, index + 1) for found in (recorded_bodies, recorded_things))
+        parts = [(int(id), people.shapes, k) for k, id in enumerate(people.id)]
+        parts += [] if things is None else [(-2, things.shapes, k) for k in range(len(things.id))]
+        return [(id, c, s) for id, b, k in parts for c, s in zip(b.centre[k], b.shape[k], strict=True)]
     who = np.flatnonzero(motion.present[index - 1])
     xy = motion.pos[index - 1, who]
     pos3 = np.column_stack([xy, height_at(motion.scene, xy)])

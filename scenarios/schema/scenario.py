@@ -1,8 +1,6 @@
-"""The keys of a scenario file, as frozen pydantic models. SI units; angles in degrees.
+"""The keys of a scenario file, as frozen pydantic models; a class with a namesake in `sim` ends in Spec. SI; degrees.
 
-docs/reference/scenario-files.md has the descriptions of the fields. A class whose subject has another class in `sim`
-ends in Spec. Where a value may be a number or a distribution (scenarios.schema.values), it is drawn once for each seed.
-`flockscope replay` reads a file of the tables camera, sensor, light and picture alone (ObservationSpec).
+Where a value may be a number or a distribution (scenarios.schema.values), it is drawn once for each seed.
 """
 
 from __future__ import annotations
@@ -15,6 +13,7 @@ from pydantic.json_schema import SkipJsonSchema
 
 from scenarios.limits import FRAME_RATES, PEOPLE, PICTURE_SIZES, fits_picture
 from scenarios.schema.colours import Colours
+from scenarios.schema.looks import LooksSpec
 from scenarios.schema.sensor import Sensor
 
 # isort: off
@@ -484,6 +483,7 @@ class Scenario(Model):
     crowd: CrowdSpec = CrowdSpec()
     group: Annotated[tuple[GroupSpec, ...], Field(min_length=1)]
     event: tuple[ScriptOrder, ...] = ()
+    looks: LooksSpec | None = None
     draw: dict[Name, Distribution] | None = None
     # Not a key of files: the distributions and links in places of fixed values, by key.
     draws: SkipJsonSchema[dict[str, dict[str, Any]] | None] = None
@@ -500,10 +500,11 @@ def expand(pattern: str, names: list[str]) -> list[str]:
 
 
 class ObservationSpec(Model):
-    """Camera, sensor, light and picture, with the keys that they have in a scenario."""
+    """Camera, sensor, light, picture and looks, with the keys that they have in a scenario; for `flockscope replay`."""
 
     schema_: Literal[1] = Field(1, alias="schema")
     camera: CameraSpec = CameraSpec()
     sensor: Sensor = Sensor()
     light: Light = Light()
     picture: Picture = Picture()
+    looks: LooksSpec | None = None

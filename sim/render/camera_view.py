@@ -100,7 +100,7 @@ def noise_offsets(rows: int, seed: int, side: int, frame: int, repeat: int = 0) 
 
 
 NODE_STEP = 16  # px between the nodes at which clouds and wind are computed; they are linear between
-OCCLUDER = -2  # id of walls and pillars in id maps
+OCCLUDER = -2  # id of walls, pillars and things in id maps
 
 
 class CameraView:

@@ -2,8 +2,8 @@
 
 The tests hold a slow twin of the drawing.
 
-A page says which garment and which shade is where on a body or head; a point of these is given by across (-1 left … 1
-right), along (1 front, -1 back) and up (-1 … 1).
+A page says which garment and which shade is where on a body, head or limb; a point of these is given by across (-1 left
+… 1 right), along (1 front, -1 back) and up (-1 … 1).
 
 People are drawn row by row of their outlines. A body part is a ball of radius 1 in its own axes (across, along, up,
 each over its half axis). There the ray of pixel (u, v) is q = P (u, v, 1) + t D (u, v, 1), with P, D (3, 3) the
@@ -21,11 +21,12 @@ from sim.compiler import njit
 from sim.render.canvas import END_COLUMN, END_ROW, FIRST_COLUMN, FIRST_ROW, MOST, UNIT
 from sim.render.canvas_kernels import mark_dirty, outline_columns
 from sim.render.texture_kernels import lattice_value, value_noise
-from sim.scene.body import BODY_PART, HEAD_PART, XX, XY, YY
+from sim.scene.body import XX, XY, YY
 
-SHOES, TROUSERS, SHIRT, SECOND, SKIN, HAIR = range(6)  # rows of a person's colours (6, 3)
+SHOES, TROUSERS, SHIRT, SECOND, SKIN, HAIR, CARRIED = range(7)  # rows of a person's colours (8, 3); two of CARRIED
 PLAIN, HOOPS, STRIPES, PATCHES, JACKET, DRESS = range(6)  # cuts
-CUT, COUNT, HEM, HAIRLINE, LEG_GAP, ARM = range(6)  # slots of a person's style
+CUT, COUNT, HEM, HAIRLINE, LEG_GAP, ARM, SLEEVE = range(7)  # slots of a person's style
+BODY_PAGE, HEAD_PAGE, ARM_PAGE, PLAIN_PAGE = range(4)  # kinds of pages; PLAIN_PAGE + r has the colour of row r alone
 ROUND, UP = 64, 64  # columns and rows of a page
 FINE = 3  # samples each way per texel
 
@@ -64,25 +65,32 @@ def _body(across, along, up, round_, style, key):  # type: ignore[no-untyped-def
 
 
 @njit(cache=True)
-def draw_page(style, key, colours, part, out):  # type: ignore[no-untyped-def]
-    """Sets out (UP, ROUND, 3) to the colours of a body or head (`part`), not clipped to 255.
+def _arm(up, style):  # type: ignore[no-untyped-def]
+    """Returns the colour's row and the shade at a point of an arm; up: of the body at whose side it hangs."""
+    return (SKIN, 0.97) if up < max(style[SLEEVE], -0.02) else (SHIRT, 0.95)
 
-    style (6,): slots CUT …. colours (6, 3): rows SHOES …. key: of the random patterns. Columns turn from the right side
-    over the front to the left side and the back.
+
+@njit(cache=True)
+def draw_page(style, key, colours, kind, middle, extent, out):  # type: ignore[no-untyped-def]
+    """Sets out (UP, ROUND, 3) to the colours of a page of a kind, BODY_PAGE …, not clipped to 255.
+
+    style (7,): slots CUT …. colours (C, 3): rows SHOES …. key: of the random patterns. middle, extent: the page shows
+    the heights up = middle ± extent. Columns turn from the right side over the front to the left side and the back.
     """
     out[:] = 0.0
     for j in range(UP * FINE):
-        up = 2.0 * (j + 0.5) / (UP * FINE) - 1.0
+        up = middle + extent * (2.0 * (j + 0.5) / (UP * FINE) - 1.0)
         for i in range(ROUND * FINE):
             round_ = 4.0 * (i + 0.5) / (ROUND * FINE)
             x = 1.0 - round_ if round_ < 2.0 else round_ - 3.0  # across and along on |x| + |y| = 1, then on a circle
             y = 1.0 - abs(x) if round_ < 2.0 else abs(x) - 1.0
             size = np.hypot(x, y)
-            row, shade = (
-                _body(x / size, y / size, up, round_, style, key)
-                if part == BODY_PART
-                else _head(x / size, y / size, up, style)
-            )
+            if kind == BODY_PAGE:
+                row, shade = _body(x / size, y / size, up, round_, style, key)
+            elif kind == HEAD_PAGE:
+                row, shade = _head(x / size, y / size, up, style)
+            else:
+                row, shade = _arm(up, style) if kind == ARM_PAGE else (kind - PLAIN_PAGE, 1.0)
             folds = 0.14 * value_noise(3.0 * round_ + 0.6 * up, 3.0 * up, key) + 0.10 * value_noise(
                 4.0 * round_, 14.0 * up, key + 1
             )
@@ -93,7 +101,7 @@ def draw_page(style, key, colours, part, out):  # type: ignore[no-untyped-def]
 
 P_AT_0, P_PER_COLUMN, D_AT_0, D_PER_COLUMN = range(4)  # columns of `ray`, its rows being the part's own axes
 X, Y, Z = range(3)
-FEET, WAIST, HEAD = range(3)  # columns of `sunlit`
+LOWER, MIDDLE, UPPER = range(3)  # columns of `sunlit`
 
 
 @njit(cache=True)
@@ -125,13 +133,13 @@ def _hit_depths(ray, left, many, t):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _texture_and_light(  # type: ignore[no-untyped-def]
-    ray, left, many, t, half, sun, shadow, sunlit, head, place, across, up, light
+    ray, left, many, t, half, sun, shadow, sunlit, place, across, up, light
 ):
     """Sets where on a texture page the points at depths t (many,) are, and how they are lit.
 
     place (many,): index of the lower left of four texels; across, up (many,): how far beyond it; light (many,):
-    brightness times UNIT. half (3,) m: half axes. sun (3,): in own axes. sunlit (3,): columns FEET …. Float32, exact to
-    1e-4 of a page.
+    brightness times UNIT. half (3,) m: half axes. sun (3,): in own axes. sunlit (3,): columns LOWER …. Float32, exact
+    to 1e-4 of a page.
     """
     f = np.float32
     px0, px1 = f(ray[X, P_AT_0]), f(ray[X, P_PER_COLUMN])
@@ -144,7 +152,7 @@ def _texture_and_light(  # type: ignore[no-untyped-def]
     # Lambert's law for the sun; the sky's light comes more from above than from the side.
     low_sun = shadow / max(sun[2], 0.3)
     s0, s1, s2 = f(sun[0] * low_sun), f(sun[1] * low_sun), f(sun[2] * low_sun)
-    waist, above, below = f(sunlit[WAIST]), f(sunlit[HEAD] - sunlit[WAIST]), f(sunlit[FEET] - sunlit[WAIST])
+    half_lit, above, below = f(sunlit[MIDDLE]), f(sunlit[UPPER] - sunlit[MIDDLE]), f(sunlit[LOWER] - sunlit[MIDDLE])
     sky, zero, one = f(UNIT * (1.0 - shadow)), f(0.0), f(1.0)
     for k in range(many):
         x, depth = f(left + k) + f(0.5), f(t[k])
@@ -155,8 +163,7 @@ def _texture_and_light(  # type: ignore[no-untyped-def]
         size = one / np.sqrt(nx * nx + ny * ny + nz * nz)
         facing = nx * s0 + ny * s1 + nz * s2
         facing = (facing if facing > zero else zero) * size
-        high = one if head else qz
-        facing *= waist + (above * high if high > zero else -below * high)
+        facing *= half_lit + (above * qz if qz > zero else -below * qz)
         light[k] = sky * (f(0.8) + f(0.2) * nz * size) + f(UNIT) * facing
         share = qx / (abs(qx) + abs(qy) + f(1e-12))
         x = (one - share if qy >= zero else f(3.0) + share) * f(0.25 * ROUND) - f(0.5)
@@ -169,28 +176,59 @@ def _texture_and_light(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def draw_people(rows, seen, shadow, atlas, shade, label, canvas, ids, margin, amodal):  # type: ignore[no-untyped-def]
-    """Draws the people of these rows by depth; only the speed depends on the order of the rows.
+def _part_rows(i, e, outlines):  # type: ignore[no-untyped-def]
+    """Returns the first row and the last + 1 of the pixels that part e of person i may cover; none if it is nan."""
+    a, b, c = outlines.inverse[i, e, XX], outlines.inverse[i, e, XY], outlines.inverse[i, e, YY]
+    half, middle = np.sqrt(a / (a * c - b * b)), outlines.middle[i, e, 1]
+    if not half >= 0.0:
+        return 0, 0
+    first, end = outlines.bounds[i, FIRST_ROW], outlines.bounds[i, END_ROW]
+    return int(max(middle - half - 1.0, float(first))), int(min(middle + half + 1.0, float(end)))
+
+
+@njit(cache=True)
+def count_silhouettes(rows, outlines, width, amodal):  # type: ignore[no-untyped-def]
+    """Sets amodal (N,) to the pixels of the whole silhouettes of the people of these rows, hidden ones included."""
+    parts = outlines.middle.shape[1]
+    lows, highs = np.empty(parts, np.int64), np.empty(parts, np.int64)
+    for i in rows:
+        for v in range(outlines.bounds[i, FIRST_ROW], outlines.bounds[i, END_ROW]):
+            # Runs of columns, sorted by their begin.
+            n = 0
+            for e in range(parts):
+                low, high = outline_columns(v, i, e, outlines, width)
+                if high > low:
+                    k = n
+                    while k > 0 and lows[k - 1] > low:
+                        lows[k], highs[k] = lows[k - 1], highs[k - 1]
+                        k -= 1
+                    lows[k], highs[k] = low, high
+                    n += 1
+            end = 0
+            for k in range(n):
+                amodal[i] += max(highs[k] - max(lows[k], end), 0)
+                end = max(end, highs[k])
+
+
+@njit(cache=True)
+def draw_people(rows, seen, shadow, atlas, shade, label, canvas, ids, margin):  # type: ignore[no-untyped-def]
+    """Draws the people, or things, of these rows by depth; only the speed depends on the order of the rows.
 
     seen: PeopleInView of N people. shadow: the sun's share of the light. With `label`, ids (H, W) gets the ids of
-    visible people, and amodal (N,) is raised by the pixels of whole silhouettes. With `shade`, colours are drawn.
+    visible people. With `shade`, colours are drawn.
     """
     width, depth, colour, outlines = canvas.depth.shape[1], canvas.depth, canvas.colour, seen.outlines
     t, ray = np.empty(width), np.empty((3, 4))
     place, one = np.empty(width, np.int32), np.float32(1.0)
     across, up, light = np.empty(width, np.float32), np.empty(width, np.float32), np.empty(width, np.float32)
     for i in rows:
-        for e in range(2):
-            page = atlas[seen.id[i] - 1, e]
-            for v in range(outlines.bounds[i, FIRST_ROW], outlines.bounds[i, END_ROW]):
+        for e in range(seen.page.shape[1]):
+            page = atlas[seen.page[i, e]]
+            first_row, end_row = _part_rows(i, e, outlines)
+            for v in range(first_row, end_row):
                 low, high = outline_columns(v, i, e, outlines, width)
                 if low == high:
                     continue
-                if label:
-                    amodal[i] += high - low
-                    if e == HEAD_PART:  # pixels of the body were counted before
-                        other, last = outline_columns(v, i, BODY_PART, outlines, width)
-                        amodal[i] -= max(0, min(last, high) - max(other, low))
                 _row_of_rays(i, e, v, seen, ray)
                 _hit_depths(ray, low, high - low, t)
                 shown = 0
@@ -208,10 +246,8 @@ def draw_people(rows, seen, shadow, atlas, shade, label, canvas, ids, margin, am
                 mark_dirty(canvas, v, low, high, margin)
                 if not shade:
                     continue
-                half, sun, sunlit, head = seen.half[i, e], seen.sun[i], seen.sunlit[i], e == HEAD_PART
-                _texture_and_light(
-                    ray, low, high - low, t, half, sun, shadow, sunlit, head, place, across, up, light
-                )  # fmt: skip
+                half, sun, sunlit = seen.half[i, e], seen.sun[i, e], seen.sunlit[i, e]
+                _texture_and_light(ray, low, high - low, t, half, sun, shadow, sunlit, place, across, up, light)
                 for u in range(low, high):
                     n = u - low
                     if t[n] > 0.0:
@@ -244,7 +280,7 @@ def _shade_line(xs, ys, zs, many, centre, shape, sx, sy, softness, shade):  # ty
 def draw_shadows(rows, place, direct, level, centre, shadows, sun, canvas, margin):  # type: ignore[no-untyped-def]
     """Darkens the canvas where the people of these rows stand before the sun; of several shadows, the darkest counts.
 
-    place (3, H, W) m, direct (H, W): of the empty scene. level: True if only level ground is in view. centre (N, 2, 3)
+    place (3, H, W) m, direct (H, W): of the empty scene. level: True if only level ground is in view. centre (N, K, 3)
     m: of the ellipsoids. shadows: PeopleShadows of N people.
     """
     width, colour, shaded = direct.shape[1], canvas.colour, canvas.shaded
@@ -255,14 +291,15 @@ def draw_shadows(rows, place, direct, level, centre, shadows, sun, canvas, margi
         for v in range(bounds[i, FIRST_ROW], bounds[i, END_ROW]):
             low, high = bounds[i, FIRST_COLUMN], bounds[i, END_COLUMN]
             if level:
-                low, high = outline_columns(v, i, BODY_PART, outlines, width)
-                first, last = outline_columns(v, i, HEAD_PART, outlines, width)
-                if last > first:
-                    low, high = (min(low, first), max(high, last)) if high > low else (first, last)
+                low, high = width, 0
+                for e in range(centre.shape[1]):
+                    first, last = outline_columns(v, i, e, outlines, width)
+                    if last > first:
+                        low, high = min(low, first), max(high, last)
             if high <= low:
                 continue
             shade[: high - low] = 0.0
-            for e in range(2):
+            for e in range(centre.shape[1]):
                 shape, softness = shadows.shape[i, e], shadows.softness[i, e]
                 xs, ys, zs = place[0, v, low:], place[1, v, low:], place[2, v, low:]
                 _shade_line(xs, ys, zs, high - low, centre[i, e], shape, sx, sy, softness, shade)

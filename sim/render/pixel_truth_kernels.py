@@ -53,8 +53,12 @@ def _depths_of_part(left, disparity, many, start, step, row, t):  # type: ignore
 
 
 @njit(cache=True)
-def _set_people(rows, depth, ids, seen, scale, right_depth, rays, solids, out):  # type: ignore[no-untyped-def]
-    """Sets out (H, W) to the disparity at the pixels of people; nan where the right camera does not see the point."""
+def set_people(rows, depth, ids, seen, scale, right_depth, rays, solids, out):  # type: ignore[no-untyped-def]
+    """Sets out (H, W) to the disparity at the pixels of people; nan where the empty scene hides the point on the right.
+
+    depth (H, W) m, ids (H, W): of the left image, with people. seen: PeopleInView of the left camera. scale: px m.
+    right_depth (H, W) m, rays, solids: of the empty scene in the right camera.
+    """
     width, bounds, id = depth.shape[1], seen.outlines.bounds, seen.id
     o, d, hit, solid = np.empty(3), np.empty(3), np.empty(HIT_SLOTS), has_solids(solids)
     for i in rows:
@@ -71,19 +75,16 @@ def _set_people(rows, depth, ids, seen, scale, right_depth, rays, solids, out): 
 
 
 @njit(cache=True)
-def add_people(rows, depth, ids, seen, scale, other, right_depth, rays, solids, out):  # type: ignore[no-untyped-def]
-    """Adds the people of these rows to out (H, W), on entry the disparities of the empty scene.
+def hide_behind_people(rows, depth, scale, other, out):  # type: ignore[no-untyped-def]
+    """Sets out (H, W), disparities, to nan where the people of these rows hide the point from the right camera.
 
-    depth (H, W) m, ids (H, W): of the left image, with people. seen, other: PeopleInView of the left and right camera.
-    scale: px m. right_depth (H, W) m, rays: of the empty scene in the right camera.
+    depth (H, W) m: of the left image, with people. scale: px m. other: PeopleInView of the right camera.
     """
     height, width = depth.shape
     row, t = np.empty(6), np.empty(width)
-    _set_people(rows, depth, ids, seen, scale, right_depth, rays, solids, out)
     middle, inverse, start, step = other.outlines.middle, other.outlines.inverse, other.start, other.step
     for i in rows:
-        # Pixels that a person hides from the right camera become nan.
-        for e in range(2):
+        for e in range(middle.shape[1]):
             mu, mv, most = middle[i, e, 0], middle[i, e, 1], scale / other.nearest[i, e]
             a, b, c = inverse[i, e, XX], inverse[i, e, XY], inverse[i, e, YY]
             half = np.sqrt(a / (a * c - b * b))

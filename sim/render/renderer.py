@@ -22,10 +22,18 @@ from numpy.typing import NDArray
 from scenarios.errors import InputError
 from sim.render.camera_view import NODE_STEP, CameraView, blur_weights, noise_offsets, noise_pool
 from sim.render.canvas import UNIT, FrameCanvas
-from sim.render.people import PeopleInView, PeopleShadows, clothing_atlas, people_in_view, people_shadows
+
+# isort: off
+# fmt: off
+from sim.render.people import (
+    PeopleInView, PeopleShadows, clothing_atlas, people_in_view, people_shadows, things_in_view,
+)
+# fmt: on
+# isort: on
 from sim.render.weather import Foliage, Illumination, draw_illumination, grow_plants
 from sim.scene import camera as cameras
-from sim.scene.body import recorded_bodies
+from sim.scene.body import RecordedBodies, recorded_bodies, recorded_things
+from sim.scene.figure import TOPS
 from sim.types import BACKGROUNDS, Array, Camera, Image, Ints, Motion, PixelTruth
 
 if TYPE_CHECKING:
@@ -51,6 +59,14 @@ def pixel_truth(ids: Ints, rows: Ints, seen: PeopleInView, amodal: Ints, dispari
     low, high = edges[:, 0::2].astype(float), edges[:, 1::2].astype(float)
     box = np.where(count[:, None] > 0, np.concatenate([low, high - low], axis=1), np.nan)
     return PixelTruth(ids, disparity, count.astype(float), amodal[rows].astype(float), box, blob)
+
+
+Shown = tuple[PeopleInView, RecordedBodies]  # people, or things, as a view sees them, and in the world
+
+
+def _rows(bodies: RecordedBodies, index: int) -> Ints:
+    """Returns the rows of frame `index`."""
+    return np.arange(*np.searchsorted(bodies.frame, (index, index + 1)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,8 +99,8 @@ class Renderer:
             )  # fmt: skip
         self.motion, self.camera = motion, camera
         self.light, self.picture = light or Light(), picture or Picture()
-        self._first, self._bodies = 0, recorded_bodies(motion, 1, 1)
-        self._seen, self._shadows = dict[CameraView, PeopleInView](), dict[CameraView, PeopleShadows]()
+        self._first, self._bodies, self._things = 0, recorded_bodies(motion, 1, 1), recorded_things(motion, 1, 1)
+        self._seen, self._shadows = dict[CameraView, list[Shown]](), dict[CameraView, list[PeopleShadows]]()
 
     @cached_property
     def illumination(self) -> Illumination:
@@ -126,7 +142,8 @@ class Renderer:
 
     @cached_property
     def _atlas(self) -> NDArray[np.uint8]:
-        return clothing_atlas(self.motion.present.shape[1], self.motion.seed, self.motion.repeat, self.motion.clothes)
+        m = self.motion
+        return clothing_atlas(m.present.shape[1], m.seed, m.repeat, m.clothes, m.looks)
 
     @cached_property
     def _noise(self) -> NDArray[np.int16]:
@@ -150,14 +167,16 @@ class Renderer:
         empty_scene_disparities(left.geometry.depth, scale, right.rays, left.solids, out)
         return out
 
-    def _disparities(self, canvas: FrameCanvas, ids: Ints, seen: PeopleInView, index: int) -> Array:
-        from sim.render.pixel_truth_kernels import add_people
+    def _disparities(self, canvas: FrameCanvas, ids: Ints, shown: list[Shown], index: int) -> Array:
+        from sim.render.pixel_truth_kernels import hide_behind_people, set_people
 
         right, out = self.right_view, self._empty_disparities.copy()
-        other, rows = self._people(right, index)
         scale = right.camera.focal_px[0] * right.camera.baseline
-        depth = right.geometry.depth
-        add_people(rows, canvas.depth, ids, seen, scale, other, depth, right.rays, right.solids, out)
+        for seen, bodies in shown:
+            rows, depth = _rows(bodies, index), right.geometry.depth
+            set_people(rows, canvas.depth, ids, seen, scale, depth, right.rays, right.solids, out)
+        for other, bodies in self._shown(right, index):
+            hide_behind_people(_rows(bodies, index), canvas.depth, scale, other, out)
         return out
 
     def frame(self, index: int) -> Image:
@@ -193,25 +212,36 @@ class Renderer:
     def _time(self, index: int) -> float:
         return (index - 1) / self.motion.fps
 
-    def _people(self, view: CameraView, index: int) -> tuple[PeopleInView, Ints]:
-        """Returns the people of the batch of frame `index` as a view sees them, and the rows of this frame."""
+    def _shown(self, view: CameraView, index: int) -> list[Shown]:
+        """Returns the people of the batch of frame `index` as a view sees them, then the things, if there are any."""
         first = index - (index - 1) % FRAMES
         if first != self._first:
             self._first, self._bodies = first, recorded_bodies(self.motion, first, first + FRAMES)
+            self._things = recorded_things(self.motion, first, first + FRAMES)
             self._seen, self._shadows = {}, {}
         if view not in self._seen:
-            sun = self.illumination.sun
-            self._seen[view] = people_in_view(self.motion, self._bodies, view.camera, view.rays, view.solids, sun)
-        return self._seen[view], np.arange(*np.searchsorted(self._bodies.frame, (index, index + 1)))
+            sight = view.camera, view.rays, view.solids, self.illumination.sun
+            self._seen[view] = [(people_in_view(self.motion, self._bodies, *sight), self._bodies)]
+            if self._things is not None:
+                self._seen[view] += [(things_in_view(self.motion, self._things, *sight), self._things)]
+        return self._seen[view]
 
-    def _draw_shadows(self, view: CameraView, seen: PeopleInView, rows: Ints, canvas: FrameCanvas) -> None:
+    def _draw_shadows(self, view: CameraView, shown: list[Shown], index: int, canvas: FrameCanvas) -> None:
         from sim.render.people_kernels import draw_shadows
 
-        light = self.illumination
+        light, motion = self.illumination, self.motion
         if view not in self._shadows:
-            self._shadows[view] = people_shadows(self.motion, self._bodies, view.camera, light, view.level)
-        place, direct, shadows = view.geometry.place, view.empty_scene.direct, self._shadows[view]
-        draw_shadows(rows, place, direct, view.level, seen.centre, shadows, light.sun, canvas, self._margin)
+            heights = [motion.height[self._bodies.id - 1]]
+            if self._things is not None and motion.looks is not None:
+                heights += [(motion.looks.size * TOPS[motion.looks.kind])[self._things.id - 1]]
+            self._shadows[view] = [
+                people_shadows(height, bodies, view.camera, light, view.level)
+                for height, (_, bodies) in zip(heights, shown, strict=True)
+            ]
+        place, direct = view.geometry.place, view.empty_scene.direct
+        for (seen, bodies), shadows in zip(shown, self._shadows[view], strict=True):
+            rows = _rows(bodies, index)
+            draw_shadows(rows, place, direct, view.level, seen.centre, shadows, light.sun, canvas, self._margin)
 
     def _moved_canvas(self, view: CameraView, index: int) -> FrameCanvas:
         canvas = view.take_canvas()
@@ -225,21 +255,25 @@ class Renderer:
     def _draw(
         self, view: CameraView, index: int, *, shade: bool, label: bool, disparity: bool = False
     ) -> tuple[Image, PixelTruth | None]:
-        from sim.render.people_kernels import draw_people
+        from sim.render.people_kernels import count_silhouettes, draw_people
 
-        seen, rows = self._people(view, index)
+        shown = self._shown(view, index)
         canvas = self._moved_canvas(view, index) if shade else view.take_canvas()
         shadow = self.illumination.shadow
         if shade and shadow > 0:
-            self._draw_shadows(view, seen, rows, canvas)
+            self._draw_shadows(view, shown, index, canvas)
         ids = view.empty_ids() if label else np.zeros((0, 0), np.int64)
-        amodal = np.zeros(len(seen.id), np.int64)
-        near_first = rows[np.argsort(seen.nearest[rows, 0], kind="stable")]
-        draw_people(near_first, seen, shadow, self._atlas, shade, label, canvas, ids, self._margin, amodal)
+        for seen, bodies in shown:
+            rows = _rows(bodies, index)
+            near_first = rows[np.argsort(seen.nearest[rows, 0], kind="stable")]
+            draw_people(near_first, seen, shadow, self._atlas, shade, label, canvas, ids, self._margin)
         image = self._finish(view, canvas, index) if shade else np.zeros((0, 0, 3), np.uint8)
         truth = None
         if label:
-            found = self._disparities(canvas, ids, seen, index) if disparity else None
+            found = self._disparities(canvas, ids, shown, index) if disparity else None
+            seen, rows = shown[0][0], _rows(self._bodies, index)
+            amodal = np.zeros(len(seen.id), np.int64)
+            count_silhouettes(rows, seen.outlines, view.width, amodal)
             truth = pixel_truth(ids, rows, seen, amodal, found)
         view.return_canvas(canvas)
         return image, truth

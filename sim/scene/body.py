@@ -1,10 +1,12 @@
 """The shape of a person, and its exact outline in an image. Home of the body's proportions and of the 1.7 m person.
 
-A person of height h is two upright ellipsoids, body and head (BODY, HEAD), turned by the heading. An ellipsoid with
-centre c and shape S = A diag(a²) Aᵀ (half axes a, axis directions the columns of A), in camera coordinates, is the dual
-quadric [[S - ccᵀ, -c], [-cᵀ, -1]]. A pinhole camera with matrix K (focal lengths, image centre) maps it to the dual
-conic C* = K (S - c cᵀ) Kᵀ: an ellipse with centre m = (C*₁₃, C*₂₃)/C*₃₃ and shape E = m mᵀ - C*₁..₂/C*₃₃ (Hartley &
-Zisserman, Multiple View Geometry, 8.3). Its points u obey (u - m)ᵀ E⁻¹ (u - m) <= 1, and its box is m ± sqrt(diag E).
+A person of height h is two upright ellipsoids, body and head (BODY, HEAD), turned by the heading; with `Motion.looks`
+it can have limbs and what is worn in place of them (sim.scene.figure): K ellipsoids, of which the first is the body or
+torso and the second the head. Outlines and boxes are those of all K. What people hold has rows of its own. An ellipsoid
+with centre c and shape S = A diag(a²) Aᵀ (half axes a, axis directions the columns of A), in camera coordinates, is the
+dual quadric [[S - ccᵀ, -c], [-cᵀ, -1]]. A pinhole camera with matrix K (focal lengths, image centre) maps it to the
+dual conic C* = K (S - c cᵀ) Kᵀ: an ellipse with centre m = (C*₁₃, C*₂₃)/C*₃₃ and shape E = m mᵀ - C*₁..₂/C*₃₃ (Hartley
+& Zisserman, Multiple View Geometry, 8.3). Its points u obey (u - m)ᵀ E⁻¹ (u - m) <= 1, and its box is m ± sqrt(diag E).
 All outlines are closed-form; nothing is sampled.
 """
 
@@ -15,6 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sim.elementary import cos, length, product, sin, turned, unit
+from sim.scene import figure
+from sim.scene.figure import Parts
 from sim.scene.terrain import height_at
 from sim.types import Array, Camera, Ints, Motion
 
@@ -37,23 +41,23 @@ class BodyPart:
 
 
 BODY = BodyPart(centre=0.44, across=0.5, along=0.5, up=0.44)
-HEAD = BodyPart(centre=0.93, across=0.045, along=0.057, up=0.07)
+HEAD = BodyPart(centre=figure.HEAD_SHARE, across=0.045, along=0.057, up=0.07)
 
 
 @dataclass(frozen=True)
 class Ellipsoids:
-    """Bodies and heads of N people in the world, as ellipsoids (X - centre)ᵀ shape⁻¹ (X - centre) <= 1."""
+    """The K parts of N people or things in the world, as ellipsoids (X - centre)ᵀ shape⁻¹ (X - centre) <= 1."""
 
-    centre: Array  # (N, 2, 3) x, y, z in m; the second axis is body, head
-    shape: Array  # (N, 2, 3, 3) symmetric matrices in m², the squared half axes turned by the heading
+    centre: Array  # (N, K, 3) x, y, z in m; the second axis is body, head if K is 2
+    shape: Array  # (N, K, 3, 3) symmetric matrices in m², the squared half axes turned by heading and pitch
 
 
 @dataclass(frozen=True)
 class Outlines:
-    """Silhouettes of N people in an image, as ellipses (u - centre)ᵀ shape⁻¹ (u - centre) <= 1, two each.
+    """Silhouettes of N people in an image, as ellipses (u - centre)ᵀ shape⁻¹ (u - centre) <= 1, K each.
 
-    centre (N, 2, 2) px and shape (N, 2, 2, 2) px²; the second axis is body, head. An ellipse is nan if its ellipsoid is
-    not wholly in front of the camera.
+    centre (N, K, 2) px and shape (N, K, 2, 2) px²; the second axis is that of Ellipsoids. An ellipse is nan if its
+    ellipsoid is not wholly in front of the camera.
     """
 
     centre: Array
@@ -67,7 +71,7 @@ class RecordedBodies:
     frame: Ints  # (B,) frame number, from 1 on
     id: Ints  # (B,) person id = column of the Motion + 1
     pos3: Array  # (B, 3) feet: x, y, z in m
-    shapes: Ellipsoids  # Ellipsoids of body and head, B rows
+    shapes: Ellipsoids  # B rows
 
 
 def half_axes(height: Array, width: Array | None = None, depth: Array | None = None) -> Array:
@@ -112,8 +116,54 @@ def recorded_bodies(motion: Motion, first: int = 1, end: int | None = None) -> R
     t += first - 1
     xy = motion.pos[t, p]
     pos3 = np.column_stack([xy, height_at(motion.scene, xy)])
-    shapes = ellipsoids(pos3, motion.heading[t, p], motion.height[p], motion.width[p], motion.depth[p])
+    if motion.looks is None:
+        shapes = ellipsoids(pos3, motion.heading[t, p], motion.height[p], motion.width[p], motion.depth[p])
+    else:
+        shapes = placed(pos3, motion.heading[t, p], parts_of_people(motion, t, p))
     return RecordedBodies(t + 1, p + 1, pos3, shapes)
+
+
+def parts_of_people(motion: Motion, t: Ints, p: Ints) -> Parts:
+    """Returns the parts of N people. t, p (N,): rows and columns of the motion."""
+    height, width, depth, looks = motion.height[p], motion.width[p], motion.depth[p], motion.looks
+    if looks is not None and looks.limbs:
+        parts = figure.limbs(height, width, depth, looks.phase[t, p], looks.swing[t, p])
+    else:
+        offset = np.zeros((len(p), 2, 3))
+        offset[..., 2] = height[:, None] * np.array([BODY.centre, HEAD.centre])
+        parts = Parts(offset, half_axes(height, width, depth), np.zeros((len(p), 2)))
+    return parts if looks is None or not looks.worn.size else figure.with_worn(parts, height, looks.worn[p])
+
+
+def recorded_things(motion: Motion, first: int = 1, end: int | None = None) -> RecordedBodies | None:
+    """Returns the things in frames first … end - 1 as `recorded_bodies` does people; `id` is the number of a thing.
+
+    None if the motion has no things.
+    """
+    looks = motion.looks
+    if looks is None or not len(looks.kind):
+        return None
+    t, m = np.nonzero(np.isfinite(looks.turn[first - 1 : None if end is None else end - 1]))
+    t += first - 1
+    xy = looks.place[t, m]
+    pos3 = np.column_stack([xy, height_at(motion.scene, xy)])
+    parts = figure.things(looks.kind[m], looks.size[m], looks.step[t, m])
+    return RecordedBodies(t + 1, m + 1, pos3, placed(pos3, looks.turn[t, m], parts))
+
+
+def placed(pos3: Array, heading: Array, parts: Parts) -> Ellipsoids:
+    """Returns the parts of N shapes at places on the ground, pos3 (N, 3) m, with headings (N,) rad."""
+    across, along = unit(heading - np.pi / 2), unit(heading)
+    axes = np.zeros((*parts.pitch.shape, 3, 3))  # columns: the own axes of each part
+    c, s = cos(parts.pitch), sin(parts.pitch)
+    axes[..., :2, 0] = across[:, None]
+    axes[..., :2, 1], axes[..., 2, 1] = along[:, None] * c[..., None], s
+    axes[..., :2, 2], axes[..., 2, 2] = -along[:, None] * s[..., None], c
+    scaled = axes * parts.half[..., None, :]
+    centre = np.repeat(pos3[:, None], parts.pitch.shape[1], axis=1)
+    centre[..., :2] += parts.offset[..., :1] * across[:, None] + parts.offset[..., 1:2] * along[:, None]
+    centre[..., 2] += parts.offset[..., 2]
+    return Ellipsoids(centre, product(scaled, scaled.swapaxes(-1, -2)))
 
 
 def outlines(camera: Camera, people: Ellipsoids) -> Outlines:
@@ -134,7 +184,7 @@ def outlines(camera: Camera, people: Ellipsoids) -> Outlines:
 
 
 def outline_boxes(ellipses: Outlines) -> Array:
-    """Returns the boxes (N, 4), left, top, width, height in px, round body and head, not clipped to the image."""
+    """Returns the boxes (N, 4), left, top, width, height in px, round all parts, not clipped to the image."""
     half = np.sqrt(np.diagonal(ellipses.shape, axis1=2, axis2=3))
     low, high = (ellipses.centre - half).min(axis=1), (ellipses.centre + half).max(axis=1)
     return np.concatenate([low, high - low], axis=1)
@@ -157,7 +207,7 @@ def packed_inverse(shape: Array) -> Array:
 
 
 def contour(ellipses: Outlines, points: int = 16) -> Array:
-    """Returns `points` points on each outline of N people, (N, 2 * points, 2) px: the body's, then the head's.
+    """Returns `points` points on each of the K outlines of N people, (N, K * points, 2) px, the body's first.
 
     An ellipse with centre m and shape E has the points m + L (cos, sin) with L Lᵀ = E.
     """
@@ -169,7 +219,7 @@ def contour(ellipses: Outlines, points: int = 16) -> Array:
     l11 = np.sqrt(np.maximum(d - l10 * l10, 0.0))
     u = ellipses.centre[..., :1] + l00[..., None] * circle[:, 0]
     v = ellipses.centre[..., 1:] + l10[..., None] * circle[:, 0] + l11[..., None] * circle[:, 1]
-    return np.stack([u, v], axis=-1).reshape(len(a), 2 * points, 2)
+    return np.stack([u, v], axis=-1).reshape(len(a), a.shape[1] * points, 2)
 
 
 def occlusion_distance(camera: Camera, pos3: Array, height: Array) -> Array:

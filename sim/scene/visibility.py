@@ -1,10 +1,11 @@
 """How much of each person a camera sees, computed from geometry alone, whether or not images are drawn.
 
-Each silhouette (body and head, `sim.scene.body`) is sampled on a grid over its amodal box. A sample is visible if it
-meets three conditions: it lies in the image; no nearer silhouette covers it; its line of sight meets no wall, pillar or
-step first. `sim.scene.body.occlusion_distance` orders people from near to far. A wall hides people beyond its line. A
-pillar hides people further away than the tangent to it. Stairs hide if the ray meets a step before the upright plane
-through the person that faces the camera. Seen from above, walls, pillars and stairs hide nobody.
+Each silhouette (body and head or limbs, `sim.scene.body`) is sampled on a grid over its amodal box. A sample is visible
+if it meets three conditions: it lies in the image; no nearer silhouette covers it; its line of sight meets no wall,
+pillar, step or thing first. `sim.scene.body.occlusion_distance` orders people from near to far. A wall hides people
+beyond its line. A pillar hides people further away than the tangent to it. Stairs hide if the ray meets a step before
+the upright plane through the person that faces the camera. Seen from above, walls, pillars and stairs hide nobody.
+Things (an umbrella, a car) hide if the ray through the sample meets one of their ellipsoids before all of the person's.
 
 Who is visible in a recording follows from the boxes alone: each is taken for an upright person of `sim.scene.body`
 whose body and head fill it. Of two people, the one whose box ends lower in the image is the nearer (flat ground, a
@@ -17,9 +18,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from sim.elementary import inverse_3x3
 from sim.scene import body
-from sim.scene.body import Ellipsoids, Outlines
-from sim.scene.raycast import only_flights, solids_of, unprojection
+from sim.scene.body import Ellipsoids, Outlines, RecordedBodies
+from sim.scene.raycast import PixelRays, only_flights, pixel_rays, solids_of, unprojection
 from sim.types import Array, Camera, Ints, Scene, Truth
 
 
@@ -34,13 +36,37 @@ class BodyVisibility(NamedTuple):
     visible_box: Array  # (R, 4) left, top, width, height in px of the visible part; nan if nothing is visible
 
 
+class Hiders(NamedTuple):
+    """Things that hide people: S rows, and the lines of sight and bodies that decide which is met first."""
+
+    first: Ints  # (F,) first row of each frame of people; `end` (F,): the last + 1
+    end: Ints
+    box: Array  # (S, 4) px
+    centre: Array  # (S, K, 3) m
+    inverse: Array  # (S, K, 3, 3) inverse shapes, 1/m²
+    own_centre: Array  # (R, J, 3) m: of the people
+    own_inverse: Array  # (R, J, 3, 3) 1/m²
+    rays: PixelRays
+
+
+def _hiders(camera: Camera, frame: Ints, shapes: Ellipsoids, things: RecordedBodies) -> Hiders:
+    frames = frame[frame_starts(frame)[:-1]]
+    first, end = (np.searchsorted(things.frame, frames, side) for side in ("left", "right"))
+    box = body.outline_boxes(body.outlines(camera, things.shapes))
+    return Hiders(
+        first, end, box, things.shapes.centre, inverse_3x3(things.shapes.shape),
+        shapes.centre, inverse_3x3(shapes.shape), pixel_rays(camera),
+    )  # fmt: skip
+
+
 def measure_visibility(
-    camera: Camera, scene: Scene, frame: Ints, pos3: Array, height: Array, shapes: Ellipsoids
-) -> BodyVisibility:
+    camera: Camera, scene: Scene, frame: Ints, pos3: Array, height: Array, shapes: Ellipsoids,
+    things: RecordedBodies | None = None,
+) -> BodyVisibility:  # fmt: skip
     """Returns what the camera sees of R people in any number of frames, exact to about 1/300.
 
-    frame (R,): sorted; people of one frame hide each other. pos3 (R, 3): feet, m. height (R,): m. shapes: their bodies
-    and heads. Lens distortion is ignored.
+    frame (R,): sorted; people of one frame hide each other. pos3 (R, 3): feet, m. height (R,): m. shapes: their bodies.
+    things: what else hides people, but is nobody. Lens distortion is ignored.
     """
     from sim.scene.visibility_kernels import sample_visibility
 
@@ -52,6 +78,7 @@ def measure_visibility(
         body.occlusion_distance(camera, pos3, height), pos3[:, :2].copy(), np.array(camera.image, dtype=float),
         np.array(camera.position, dtype=float), unprojection(camera), solids if hides else None,
         only_flights(solids.flights) if climbs else None,
+        None if things is None else _hiders(camera, frame, shapes, things),
     )  # fmt: skip
     return BodyVisibility(box, visibility, truncation, visible_box)
 
@@ -76,7 +103,7 @@ def with_visibility(truth: Truth, image_size: tuple[int, int] | None) -> Truth:
     seen, truncation, visible_box = sample_visibility(
         frame_starts(truth.frame), np.array(truth.box), np.ascontiguousarray(ellipses.centre),
         body.packed_inverse(ellipses.shape), -(truth.box[:, 1] + truth.box[:, 3]), np.zeros((len(truth.box), 2)), size,
-        np.zeros(3), np.eye(3), None, None,
+        np.zeros(3), np.eye(3), None, None, None,
     )  # fmt: skip
     labelled = bool((truth.visibility < 1).any())
     return truth.replace(

@@ -18,12 +18,23 @@ LEFT, TOP, WIDTH, HEIGHT = range(4)  # columns of boxes
 
 @njit(cache=True)
 def _inside(centre, inverse, i, u, v):  # type: ignore[no-untyped-def]
-    """Returns True if image point (u, v) lies in the body or head of person i."""
-    for part in range(2):
+    """Returns True if image point (u, v) lies in a part of person i."""
+    for part in range(centre.shape[1]):
         x, y = u - centre[i, part, 0], v - centre[i, part, 1]
         if x * x * inverse[i, part, XX] + 2 * x * y * inverse[i, part, XY] + y * y * inverse[i, part, YY] <= 1.0:
             return True
     return False
+
+
+@njit(cache=True)
+def _overlap(a, b):  # type: ignore[no-untyped-def]
+    """Returns True if two boxes (4,) overlap."""
+    return (
+        b[LEFT] < a[LEFT] + a[WIDTH]
+        and a[LEFT] < b[LEFT] + b[WIDTH]
+        and b[TOP] < a[TOP] + a[HEIGHT]
+        and a[TOP] < b[TOP] + b[HEIGHT]
+    )
 
 
 @njit(cache=True)
@@ -33,15 +44,41 @@ def _nearer_people(i, first, last, box, distance, found):  # type: ignore[no-unt
     for j in range(first, last):
         if distance[j] > distance[i] or (distance[j] == distance[i] and j >= i):
             continue
-        if (
-            box[j, LEFT] < box[i, LEFT] + box[i, WIDTH]
-            and box[i, LEFT] < box[j, LEFT] + box[j, WIDTH]
-            and box[j, TOP] < box[i, TOP] + box[i, HEIGHT]
-            and box[i, TOP] < box[j, TOP] + box[j, HEIGHT]
-        ):
+        if _overlap(box[i], box[j]):
             found[n] = j
             n += 1
     return n
+
+
+@njit(cache=True)
+def _first_part(o, d, centre, inverse):  # type: ignore[no-untyped-def]
+    """Returns where the ray o + s d first meets one of K ellipsoids, centre (K, 3), inverse (K, 3, 3); inf if none."""
+    best = np.inf
+    for k in range(len(centre)):
+        a = b = c = 0.0
+        for x in range(3):
+            wx = o[x] - centre[k, x]
+            for y in range(3):
+                wy, m = o[y] - centre[k, y], inverse[k, x, y]
+                a, b, c = a + d[x] * m * d[y], b + wx * m * d[y], c + wx * m * wy
+        root = b * b - a * (c - 1.0)
+        if root >= 0.0:
+            s = (-b - np.sqrt(root)) / a
+            if 0.0 < s < best:
+                best = s
+    return best
+
+
+@njit(cache=True)
+def _behind_a_thing(i, u, v, near, n, things, o, d):  # type: ignore[no-untyped-def]
+    """Returns True if the ray through (u, v) meets one of the first n things in `near` before person i."""
+    at_pixel(things.rays.origin, u, v, o)
+    at_pixel(things.rays.direction, u, v, d)
+    own = _first_part(o, d, things.own_centre[i], things.own_inverse[i])
+    first = np.inf
+    for k in range(n):
+        first = min(first, _first_part(o, d, things.centre[near[k]], things.inverse[near[k]]))
+    return first < own
 
 
 @njit(cache=True)
@@ -97,22 +134,24 @@ def _meets_any(d, eye, between, n_walls, before, n_pillars, solids, hit):  # typ
 
 @njit(cache=True)
 def sample_visibility(  # type: ignore[no-untyped-def]
-    starts, box, centre, inverse, distance, pos, image_size, eye, unproject, solids, stairs
+    starts, box, centre, inverse, distance, pos, image_size, eye, unproject, solids, stairs, things
 ):
     """Returns visibility (R,), truncation (R,) and visible boxes (R, 4) px of R people.
 
-    starts (F + 1,): first row of each frame. box (R, 4) px. centre (R, 2, 2) px, inverse (R, 2, 3): of body and head.
+    starts (F + 1,): first row of each frame. box (R, 4) px. centre (R, K, 2) px, inverse (R, K, 3): of the parts.
     distance (R,): occlusion order, nearest lowest. pos (R, 2) m: feet. unproject (3, 3): `raycast.unprojection`.
     solids: None without walls and pillars that can hide somebody. stairs: Solids without walls and pillars; None
     without stairs.
     """
-    # numba leaves out the branches of solids and stairs if they are None: half of what there is to compile.
+    # numba leaves out the branches of solids, stairs and things if they are None: half of what there is to compile.
     rows = len(box)
     seen, cut, part = np.empty(rows), np.empty(rows), np.empty((rows, 4))
     people = np.empty(rows, np.int64)
     if solids is not None:
         between, before = np.empty(len(solids.walls), np.int64), np.empty(len(solids.pillars), np.int64)
-    d, hit = np.empty(3), np.empty(HIT_SLOTS)
+    if things is not None:
+        near = np.empty(len(things.box), np.int64)
+    o, d, hit = np.empty(3), np.empty(3), np.empty(HIT_SLOTS)
     for f in range(len(starts) - 1):
         for i in range(starts[f], starts[f + 1]):
             left, top, width, height = box[i, LEFT], box[i, TOP], box[i, WIDTH], box[i, HEIGHT]
@@ -122,13 +161,18 @@ def sample_visibility(  # type: ignore[no-untyped-def]
             if not (width > 0 and height > 0):
                 continue
             n = _nearer_people(i, starts[f], starts[f + 1], box, distance, people)
-            n_walls = n_pillars = 0
+            n_walls = n_pillars = n_things = 0
             if solids is not None:
                 n_walls = _walls_between(pos[i, 0], pos[i, 1], eye, solids.walls, between)
                 n_pillars = _pillars_before(pos[i, 0], pos[i, 1], eye, solids.pillars, before)
+            if things is not None:
+                for j in range(things.first[f], things.end[f]):
+                    if _overlap(box[i], things.box[j]):
+                        near[n_things] = j
+                        n_things += 1
             whole = left >= 0 and top >= 0 and left + width <= image_size[0] and top + height <= image_size[1]
             # Most people are wholly in view with nothing before them.
-            if whole and n + n_walls + n_pillars == 0 and stairs is None:
+            if whole and n + n_walls + n_pillars + n_things == 0 and stairs is None:
                 seen[i], cut[i] = 1.0, 0.0
                 for k in range(4):  # an assignment of the row takes two seconds to compile
                     part[i, k] = box[i, k]
@@ -156,6 +200,8 @@ def sample_visibility(  # type: ignore[no-untyped-def]
                     if solids is not None and not hidden and n_walls + n_pillars > 0:
                         at_pixel(unproject, u, v, d)
                         hidden = _meets_any(d, eye, between, n_walls, before, n_pillars, solids, hit)
+                    if things is not None and not hidden and n_things > 0:
+                        hidden = _behind_a_thing(i, u, v, near, n_things, things, o, d)
                     if stairs is not None:
                         at_pixel(unproject, u, v, d)
                         dx, dy = pos[i, 0] - eye[0], pos[i, 1] - eye[1]

@@ -2,8 +2,8 @@
 
 `bodies` gives the part that sensors need; `label` adds groups, events and hard negatives (strangers who walk like a
 group). The times of orders are not used; sim.truth.order_fulfilment checks afterwards whether the orders came true.
-Hulls of groups in the image are those of their members' silhouettes: two polygons of POINTS (24) vertices each,
-inscribed in the ellipses of body and head.
+Hulls of groups in the image are those of their members' silhouettes: polygons of POINTS (24) vertices inscribed in the
+ellipses of body and head, or of POINTS_OF_LIMB (8) in each of more parts.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from sim.clock import FrameTicks
-from sim.scene.body import Ellipsoids, Outlines, RecordedBodies, contour, outlines, recorded_bodies
+from sim.scene.body import Ellipsoids, Outlines, RecordedBodies, contour, outlines, recorded_bodies, recorded_things
 from sim.scene.camera import project, px_per_m_at_centre
 from sim.scene.visibility import measure_visibility
 from sim.stuck import Immobile
@@ -23,7 +23,7 @@ from sim.truth.motion_rows import MotionRows
 from sim.truth.order_fulfilment import fulfilment
 from sim.types import Array, Camera, GroupEvent, Groups, Ints, Motion, Near, Order, Truth
 
-POINTS = 24  # vertices of each polygon
+POINTS, POINTS_OF_LIMB = 24, 8  # vertices of each polygon
 INSTANT = 0.02  # s: half the step by which ground velocities become image velocities
 
 
@@ -50,7 +50,8 @@ def hulls(ellipses: Outlines, starts: Ints) -> list[Array]:
     """Returns the convex hull (V, 2) px of each of G groups. starts (G,): the first row of each in `ellipses`."""
     from sim.geometry import hull_kernels
 
-    return list(hull_kernels.convex_hulls([p.reshape(-1, 2) for p in np.split(contour(ellipses, POINTS), starts[1:])]))
+    points = contour(ellipses, POINTS if ellipses.centre.shape[1] == 2 else POINTS_OF_LIMB)
+    return list(hull_kernels.convex_hulls([p.reshape(-1, 2) for p in np.split(points, starts[1:])]))
 
 
 def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:
@@ -67,7 +68,9 @@ def bodies(motion: Motion, camera: Camera | None, people: RecordedBodies | None 
     people = recorded_bodies(motion) if people is None else people
     t, p = people.frame - 1, people.id - 1
     box, visibility, truncation, visible_box = (None, np.ones(len(p)), None, None) if camera is None else (
-        measure_visibility(camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes)
+        measure_visibility(
+            camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes, recorded_things(motion)
+        )
     )  # fmt: skip
     return Truth(
         name=motion.name, fps=motion.fps, length=len(motion.present),

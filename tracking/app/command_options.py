@@ -293,7 +293,7 @@ class ReplayCommandOptions(PictureOptions, LabelOptions, words="replay", run="da
     source: Path = SOURCE()
     out: Path = OUT()
     camera: Path | None = option(
-        "Tables [camera], [sensor], [light], [picture]; each may be absent.", None, metavar="FILE.toml")
+        "Tables [camera], [sensor], [light], [picture], [looks]; each may be absent.", None, metavar="FILE.toml")
     seeds: str = SEEDS("Seeds of bodies, looks and sensor. For real recordings from 20000 on.", "20000")
     start: float = option("Second at which to begin.", 0.0, low=0.0, metavar="S")
     duration: float | None = option("Seconds to replay. Default: up to the end.", None, metavar="S")
