@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from scenarios.limits import PICTURE_SIDE
 from sim.render.canvas import MOST, TILE_H, TILE_W, UNIT, FrameCanvas
 from sim.render.weather import Foliage, Illumination
-from sim.rng import rng
+from sim.rng import look_seed, rng
 from sim.scene.raycast import GROUND, NOTHING, PILLAR, WALL, PixelRays, Solids, pixel_rays, signed_scale, solids_of
 from sim.types import Array, Camera, Ints, Motion
 
@@ -91,7 +91,7 @@ def _offsets_of_frames(rows: int, seed: int, side: int, draw: int, repeat: int) 
     return rng(seed, "noise", side, draw, repeat=repeat).integers(POOL, size=(FRAMES_PER_DRAW, rows))
 
 
-def noise_offsets(rows: int, seed: int, side: int, frame: int, repeat: int = 0) -> Ints:
+def noise_offsets(rows: int, seed: int, repeat: int, side: int, frame: int) -> Ints:
     """Returns the index in the noise pool at which the noise of each image row begins, (rows,).
 
     side: 0 the left camera, 1 the right one. frame: number from 1 plus BACKGROUNDS; background images have 1 to 50.
@@ -154,7 +154,7 @@ class CameraView:
 
         size, light, plants = (self.height, self.width), self.light, self.plants
         colour, direct, green = np.empty((*size, 3), np.float32), *np.empty((2, *size), np.float32)
-        source = rng(self.motion.seed, "texture", MATERIALS, repeat=self.motion.repeat)
+        source = rng(look_seed(self.motion.seed, self.motion.name), "texture", MATERIALS, repeat=self.motion.repeat)
         shades = source.normal(size=(len(PALETTE), 1)), 0.3 * SPREAD * source.normal(size=(len(PALETTE), 3))
         palette = PALETTE + SPREAD * shades[0] + shades[1]
         slab = float(source.choice(SLAB_WIDTHS))

@@ -24,6 +24,7 @@ from sim.render.camera_view import NODE_STEP, CameraView, blur_weights, noise_of
 from sim.render.canvas import UNIT, FrameCanvas
 from sim.render.people import PeopleInView, PeopleShadows, clothing_atlas, people_in_view, people_shadows
 from sim.render.weather import Foliage, Illumination, draw_illumination, grow_plants
+from sim.rng import look_seed
 from sim.scene import camera as cameras
 from sim.scene.body import recorded_bodies
 from sim.types import BACKGROUNDS, Array, Camera, Image, Ints, Motion, PixelTruth
@@ -67,7 +68,7 @@ class Renderer:
 
     State: everything that is the same in all frames, computed when first needed, and the people of the batch of frames
     drawn last (batches begin at frame 1, 17, 33, …), as each view sees them. Random values of light and picture are
-    drawn with the Motion's seed.
+    drawn with the Motion's seed and name (`sim.rng.look_seed`).
     """
 
     def __init__(
@@ -83,13 +84,14 @@ class Renderer:
             )  # fmt: skip
         self.motion, self.camera = motion, camera
         self.light, self.picture = light or Light(), picture or Picture()
+        self._look = look_seed(motion.seed, motion.name), motion.repeat
         self._first, self._bodies = 0, recorded_bodies(motion, 1, 1)
         self._seen, self._shadows = dict[CameraView, PeopleInView](), dict[CameraView, PeopleShadows]()
 
     @cached_property
     def illumination(self) -> Illumination:
         """The light that the seed of the motion gives."""
-        return draw_illumination(self.light, self.motion.seed, self.motion.repeat)
+        return draw_illumination(self.light, *self._look)
 
     @cached_property
     def left_view(self) -> CameraView:
@@ -122,11 +124,11 @@ class Renderer:
 
     @cached_property
     def _plants(self) -> Foliage | None:
-        return grow_plants(self.picture, self.camera, self.motion.scene, self.motion.seed, self.motion.repeat)
+        return grow_plants(self.picture, self.camera, self.motion.scene, *self._look)
 
     @cached_property
     def _atlas(self) -> NDArray[np.uint8]:
-        return clothing_atlas(self.motion.present.shape[1], self.motion.seed, self.motion.repeat, self.motion.clothes)
+        return clothing_atlas(self.motion.present.shape[1], *self._look, self.motion.clothes)
 
     @cached_property
     def _noise(self) -> NDArray[np.int16]:
@@ -251,7 +253,7 @@ class Renderer:
         number = index + BACKGROUNDS
         gain = np.float32(self.picture.right_gain if view.side else 1.0)
         bright = view.brightness(self._time(index), number) * gain
-        offsets = noise_offsets(view.height, self.motion.seed, view.side, number, self.motion.repeat)
+        offsets = noise_offsets(view.height, *self._look, view.side, number)
         flat = view.height, 3 * view.width
         finish_image(
             canvas.colour.reshape(flat), view.blurred_canvas.reshape(flat), canvas.dirty, self._weights, bright,

@@ -98,7 +98,7 @@ class Illumination:
     flicker: float  # standard deviation of the logarithm of brightness from frame to frame
     # sudden changes: (start s, end s, gain) each; gain is the factor of brightness from the end on
     switches: tuple[tuple[float, float, float], ...]
-    # seed, repeat : seed and number of the suite entry's copy (0: none); they name the random stream of the flicker
+    # seed, repeat : look seed and number of the suite entry's copy (0: none); they name the flicker's random stream
     seed: int
     repeat: int
 
@@ -117,7 +117,7 @@ class Illumination:
 
 
 def draw_illumination(light: Light, seed: int, repeat: int = 0) -> Illumination:
-    """Returns the light for a scenario's settings and a seed. repeat: number of the suite entry's copy, 0 without."""
+    """Returns the light for a scenario's settings and a `look_seed`. repeat: number of the suite entry's copy, or 0."""
     source = rng(seed, "light", SUN, repeat=repeat)
     azimuth, elevation = (np.deg2rad(draw(v, source)) for v in (light.sun_azimuth_deg, light.sun_elevation_deg))
     elevation = np.clip(elevation, np.deg2rad(0.1), np.pi / 2)  # one draw in a thousand may be beyond
@@ -161,7 +161,7 @@ class Foliage:
 
 
 def grow_plants(picture: Picture, camera: Camera, scene: Scene, seed: int, repeat: int = 0) -> Foliage | None:
-    """Returns the plants for a seed; None if their share is 0, or if no ground in view is near enough for plants."""
+    """Returns the plants of a `look_seed`; None if their share is 0, or no ground in view is near enough for plants."""
     source = rng(seed, "wind", PLACE, repeat=repeat)
     share = min(draw(picture.foliage, source), 1.0)
     if share <= 0:
