@@ -58,6 +58,13 @@ class Light(Model):
         cloud_size: size of the patches: distance at which their correlation is 0.6, m
         cloud_speed: speed of the patches, m/s
         switch: sudden changes of brightness
+        level: factor of all brightness: exposure, dusk
+        warmth: share by which red is stronger, and blue weaker, as in lamp light or at sunset; negative: cool
+        lamps: number of street lamps, each of which lights a pool of ground and the people in it
+        lamp_share: share of the light, right below a lamp, that is the lamp's; 1 = black night between the pools
+        fog: extinction, 1/m: over a distance d contrast falls to exp(-fog d); not seen from above
+        wet: share of the ground that is wet: darker, and a mirror of the sky where seen at a slant
+        rain: streaks of falling rain in 10,000 px of a picture
     """
 
     sun_azimuth_deg: Value = Distribution(uniform=(-180, 180))
@@ -71,6 +78,16 @@ class Light(Model):
     cloud_size: Positive = 8.0
     cloud_speed: Annotated[float, within(0.0, 1000.0, " m/s")] = 1.0
     switch: tuple[LightSwitch, ...] = ()
+    level: Annotated[float, within(0.01, 100.0)] = 1.0
+    warmth: Annotated[float, within(-0.9, 0.9)] = 0.0
+    lamps: Annotated[int, Field(ge=0, le=100)] = 0
+    lamp_share: Share = 0.8
+    fog: Annotated[float, within(0.0, 10.0, " 1/m")] = 0.0
+    wet: Share = 0.0
+    rain: Annotated[float, within(0.0, 1000.0)] = 0.0
+
+
+Ground = Literal["any", "paving", "tiles", "asphalt", "concrete", "gravel", "grass", "floor"]
 
 
 class Picture(Model):
@@ -80,11 +97,23 @@ class Picture(Model):
     without the errors right_….
 
     Attributes:
+        ground: what the ground is made of; any = slabs or asphalt
+        grass: false: no grass around the world, nor beside the roads that cross a given ground
+        walls: what walls look like; windows = a façade
+        backdrop: what stands behind all people, at the end of the ground; not seen from above
+        variety: factor of the standard deviation by which the colours of materials differ between sequences, of 12
+            grey levels in brightness
+        paint: contrast of painted lines and stripes on the ground
+        stains: contrast of stains, cracks, manholes and litter on the ground
         texture: contrast of the patterns on ground and walls
         samples: rays along each axis of a pixel of the empty scene, averaged; with more, patterns are finer
         noise: standard deviation of the noise of each pixel and colour channel at grey level 128, grey levels
         shot: share of that noise's variance that is proportional to the brightness
         blur_px: standard deviation of the blur, px
+        sharpen: strength of the camera's edge enhancement, which leaves bright and dark seams; 0 = none
+        contrast: factor of all differences from grey level 128
+        grey: true: a picture without colours
+        shutter: share of the time between two frames during which the shutter is open: people who move are blurred
         jpeg: quality of JPEG compression, which adds artefacts; 0 = no compression
         foliage: share of the image that is covered by plants moving in the wind; on the ground only
         sway_px: standard deviation of the plants' movement along each axis, px
@@ -94,11 +123,22 @@ class Picture(Model):
         right_down_px: distance by which the right picture's content lies too low, px, which is not calibrated
     """
 
+    ground: Ground = "any"
+    grass: bool = True
+    walls: Literal["brick", "plaster", "panels", "windows"] = "brick"
+    backdrop: Literal["none", "hedge", "woods", "houses"] = "none"
+    variety: Annotated[float, within(0.0, 10.0)] = 1.0
+    paint: Share = 0.0
+    stains: Share = 0.0
     texture: Share = 0.5
     samples: Annotated[int, Field(ge=1, le=4)] = 1
     noise: Annotated[float, within(0.0, 255.0, " grey levels")] = 3.0
     shot: Share = 0.5
     blur_px: Pixels = 0.6
+    sharpen: Annotated[float, within(0.0, 3.0)] = 0.0
+    contrast: Annotated[float, within(0.01, 10.0)] = 1.0
+    grey: bool = False
+    shutter: Share = 0.0
     jpeg: Annotated[int, Field(ge=0, le=100)] = 0
     foliage: Annotated[Value, within(0.0, 1.0)] = 0.0
     sway_px: Pixels = 1.5

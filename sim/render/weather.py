@@ -83,7 +83,7 @@ def oscillation(source: np.random.Generator, sd: float, length: float, time: flo
     return _with_random_phases(source, sd, source.normal(size=(WAVES, 2)) / length, source.normal(size=WAVES) / time)
 
 
-SUN, DRIFT, FLICKER, SWITCH, CLOUD = range(5)  # keys of the random role "light"
+SUN, DRIFT, FLICKER, SWITCH, CLOUD, RAIN = range(6)  # keys of the random role "light"
 
 
 @dataclass(frozen=True)
@@ -137,6 +137,25 @@ def brightness(light: Light, seed: int, repeat: int, fps: float, length: int) ->
     """Returns the factor of brightness in each of the frames 1 … length, (length,), without clouds and flicker."""
     steady = replace(draw_illumination(light, seed, repeat), flicker=0.0)
     return np.array([steady.gain(k / fps, 0) for k in range(length)])
+
+
+RAIN_SLANT = 0.15  # px to the right per px downwards: standard deviation between sequences, five times that of drops
+RAIN_SHARES, RAIN_LENGTHS = (0.08, 0.3), (0.02, 0.07)  # of the sky's colour in a streak; of the picture's height
+
+
+def rain_drops(rain: float, size: tuple[int, int], look: tuple[int, int], side: int, frame: int) -> Array:
+    """Returns the streaks of one picture for `air_kernels.draw_rain`, (N, 5). rain: streaks in 10,000 px.
+
+    size: width and height, px. look: look seed and repeat. side, frame: as of `camera_view.noise_offsets`.
+    """
+    seed, repeat = look
+    wind = RAIN_SLANT * rng(seed, "light", RAIN, repeat=repeat).normal()
+    source = rng(seed, "light", RAIN, side, frame, repeat=repeat)
+    many = source.poisson(rain * size[0] * size[1] / 1e4)
+    low, high = np.transpose([RAIN_SHARES, np.array(RAIN_LENGTHS) * size[1], (0, 0), (-0.1, 1), (-0.1, 1)])
+    drops = source.uniform(low, high, (many, 5))
+    drops[:, 2] = wind + RAIN_SLANT / 5 * source.normal(size=many)
+    return np.asarray(drops)
 
 
 SAMPLE_STEP = 4  # px between the samples that decide where plants grow
