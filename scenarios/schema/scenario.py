@@ -99,7 +99,7 @@ class Picture(Model):
     Attributes:
         ground: what the ground is made of; any = slabs or asphalt
         grass: false: no grass around the world, nor beside the roads that cross a given ground
-        walls: what walls look like; windows = a façade
+        walls: what walls look like, windows = a façade; with all but brick, pillars and steps are smoother, too
         backdrop: what stands behind all people, at the end of the ground; not seen from above
         variety: factor of the standard deviation by which the colours of materials differ between sequences, of 12
             grey levels in brightness

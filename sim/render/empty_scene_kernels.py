@@ -11,25 +11,13 @@ import numpy as np
 from sim.compiler import njit
 from sim.render.air_kernels import lamp_light, night
 from sim.render.materials import BACKDROPS, BRICK, GRASS, GREY, SKY, STEP, STONE, WALLS
-from sim.render.texture_kernels import (
-    COS,
-    SIN,
-    contrast_kept,
-    facade,
-    grain,
-    lattice_value,
-    paint_lines,
-    parked_car,
-    plant_cover,
-    poster,
-    skyline,
-    slabs,
-    stain,
-    value_noise,
-)
 
 # isort: off
 # fmt: off
+from sim.render.texture_kernels import (
+    COS, SIN, contrast_kept, facade, grain, lattice_value, paint_lines, parked_car, plant_cover, poster, skyline, slabs,
+    stain, value_noise,
+)
 from sim.scene.raycast import (
     GROUND, HIT_INDEX, HIT_KIND, HIT_PLACE, HIT_SLOTS, NORMAL_X, NOTHING, PILLAR, RISER, TREAD, WALL,
 )
@@ -71,12 +59,8 @@ def _ground(x, y, size, footprint, slope, style, palette, out):  # type: ignore[
         _tint(palette[GRASS], contrast * (0.4 * fine + 0.16 * style.mottle * patches), warmth, out)
     else:
         tile = slabs(x, y, slab, style.slab_shape * slab, 0.012, key + 40, footprint) if slab > 0 else 0.0
-        _tint(
-            palette[GREY],
-            contrast * (style.grain * fine + 0.1 * style.mottle * patches + style.tile * tile),
-            warmth,
-            out,
-        )
+        shade = style.grain * fine + 0.1 * style.mottle * patches + style.tile * tile
+        _tint(palette[GREY], contrast * shade, warmth, out)
         if kerb:
             _tint(out, 0.3 * contrast_kept(0.15, footprint), 0.0, out)
         if style.paint > 0:
@@ -107,7 +91,7 @@ def _upright(kind, along, z, footprint, style, palette, key, out):  # type: igno
     fine, contrast = grain(along, z, key + 60, footprint, 0.6), style.contrast
     if kind == WALL and style.walls > 0:
         shade = 0.06 * fine + 0.1 * value_noise(0.4 * along, 0.7 * z, key + 62)
-        shade += 0.2 * slabs(along, z, 1.2, 2.4, 0.015, key + 61, footprint) if style.walls == PANELS else 0.0
+        shade += 0.1 * slabs(along, z, 1.2, 2.4, 0.015, key + 61, footprint) if style.walls == PANELS else 0.0
         windows = facade(along, z, key + 63, footprint) if style.walls == WINDOWS else 0.0
         shown, light, warmth = poster(along, z, key + 64)
         shown = shown and style.walls != WINDOWS
@@ -119,7 +103,7 @@ def _upright(kind, along, z, footprint, style, palette, key, out):  # type: igno
     else:
         row = STONE if kind == PILLAR else STEP
         edge = -0.18 if kind == RISER else 0.0
-        _tint(palette[row], contrast * 0.4 * fine * style.mottle + edge, 0.0, out)
+        _tint(palette[row], contrast * (0.4 if style.walls == 0 else 0.15) * fine + edge, 0.0, out)
 
 
 @njit(cache=True)

@@ -53,7 +53,7 @@ GROUNDS = {
 ANY = GroundKind((150, 154, 155), (0.0, 0.0), 0.6, 0.16, 0.26, 0.0, 0.4, 1.0)
 VERGES = (1.0, 4.0, 12.0, np.inf)  # m beyond the world at which grass begins
 ROADS = (2.0, 3.0, 4.5, np.inf, np.inf)  # m: half the width of a road through the middle of the world; inf: no road
-RAGGED = 0.03  # m: raggedness of the border of a road or square; 0.3 where the ground may be any
+RAGGED = (0.03, 0.12, 0.12)  # m: raggedness of the border of a road or square, the first with kerbs; 0.3 for any ground
 # BGR of walls and houses that are not of the plain brick: red brick, cream, grey, ochre, white, dark
 FACADES = ((72, 92, 150), (170, 200, 220), (140, 142, 145), (100, 150, 190), (212, 218, 220), (85, 88, 95))
 WALLS = ("brick", "plaster", "panels", "windows")
@@ -103,12 +103,14 @@ def draw_materials(
     kind, base, verge, ragged, road = ANY, PALETTE.copy(), 1.0, 0.3, np.array([1.0, 0.0, np.inf])
     own = rng(seed, "texture", MATERIALS, KIND, repeat=repeat)
     if picture.ground != "any":
-        kind, ragged = GROUNDS[picture.ground], RAGGED
+        kind, ragged = GROUNDS[picture.ground], float(own.choice(RAGGED))
         slab, verge, turn = own.uniform(*kind.width), float(own.choice(VERGES)), own.uniform(-0.5, 0.5)
         road = np.array([np.cos(turn), np.sin(turn), own.choice(ROADS)])
         base[GREY] = kind.colour
     if not picture.grass:
-        verge, road[2] = np.inf, np.inf
+        road[2] = np.inf
+    if not picture.grass or road[2] < np.inf:
+        verge = np.inf
     if picture.walls != "brick" or picture.backdrop == "houses":
         base[BRICK] = FACADES[int(own.integers(len(FACADES)))]
     place = rng(seed, "texture", MATERIALS, LAMPS, repeat=repeat)
