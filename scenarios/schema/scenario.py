@@ -113,7 +113,7 @@ class Picture(Model):
         sharpen: strength of the camera's edge enhancement, which leaves bright and dark seams; 0 = none
         contrast: factor of all differences from grey level 128
         grey: true: a picture without colours
-        shutter: share of the time between two frames during which the shutter is open: people who move are blurred
+        shutter: time for which the shutter is open, s: people who move are blurred
         jpeg: quality of JPEG compression, which adds artefacts; 0 = no compression
         foliage: share of the image that is covered by plants moving in the wind; on the ground only
         sway_px: standard deviation of the plants' movement along each axis, px
@@ -138,7 +138,7 @@ class Picture(Model):
     sharpen: Annotated[float, within(0.0, 3.0)] = 0.0
     contrast: Annotated[float, within(0.01, 10.0)] = 1.0
     grey: bool = False
-    shutter: Share = 0.0
+    shutter: Annotated[float, within(0.0, 1.0, " s")] = 0.0
     jpeg: Annotated[int, Field(ge=0, le=100)] = 0
     foliage: Annotated[Value, within(0.0, 1.0)] = 0.0
     sway_px: Pixels = 1.5

@@ -153,7 +153,7 @@ class Renderer:
     @cached_property
     def _while_open(self) -> list[Renderer]:
         """Renderers of the same people a little earlier and later, while the shutter is open."""
-        step = self.picture.shutter / (SHOTS * self.motion.fps)
+        step = self.picture.shutter / SHOTS
         others = [copy(self) for _ in range(SHOTS - 1 if step > 0 else 0)]
         for k, other in zip((-2, -1, 1, 2), others, strict=False):
             other.motion = self.motion.replace(pos=self.motion.pos + k * step * self.motion.vel)

@@ -26,7 +26,7 @@ LIGHTS = [
 PICTURES = [
     *({"ground": name} for name in ("paving", "tiles", "asphalt", "concrete", "gravel", "grass", "floor")),
     *({"walls": name} for name in ("plaster", "panels", "windows")), {"variety": 2.0}, {"paint": 0.8}, {"stains": 0.8},
-    {"ground": "tiles", "grass": False}, {"contrast": 0.5}, {"grey": True}, {"shutter": 0.5}, {"sharpen": 0.5},
+    {"ground": "tiles", "grass": False}, {"contrast": 0.5}, {"grey": True}, {"shutter": 0.05}, {"sharpen": 0.5},
 ]  # fmt: skip
 
 
@@ -182,12 +182,12 @@ def test_a_grey_picture_has_equal_channels() -> None:
 
 
 def test_an_open_shutter_shows_the_mean_of_five_moments() -> None:
-    step = 0.6 / (5 * MOTION.fps)
+    step = 0.06 / 5
     moved = [
         Renderer(MOTION.replace(pos=MOTION.pos + k * step * MOTION.vel), CAMERA, DARK, CLEAN) for k in range(-2, 3)
     ]
     wanted = np.mean([one.frame(4).astype(float) for one in moved], axis=0)
-    assert np.abs(made(shutter=0.6).frame(4) - wanted).max() <= 1
+    assert np.abs(made(shutter=0.06).frame(4) - wanted).max() <= 1
     still = MOTION.replace(vel=np.zeros_like(MOTION.vel))
     one, other = (Renderer(still, CAMERA, DARK, CLEAN.model_copy(update={"shutter": s})) for s in (0.0, 1.0))
     assert np.array_equal(one.frame(4), other.frame(4))
