@@ -35,7 +35,7 @@ from sim.scene.raycast import GROUND, NOTHING, PILLAR, WALL, PixelRays, Solids, 
 from sim.types import Array, Camera, Ints, Motion
 
 if TYPE_CHECKING:
-    from scenarios.schema.scenario import Picture
+    from scenarios.schema.pictures import Picture
 
 
 Floats = NDArray[np.float32]

@@ -14,7 +14,7 @@ from sim.rng import rng
 from sim.types import Array, Camera, Motion
 
 if TYPE_CHECKING:
-    from scenarios.schema.scenario import Light, Picture
+    from scenarios.schema.pictures import Light, Picture
     from sim.render.weather import Foliage
 
 MATERIALS, KIND, LAMPS = 0, 1, 2  # keys of the random role "texture": (0,), (0, 1), (0, 2); people have (1,), (2,), …
@@ -44,9 +44,9 @@ class GroundKind(NamedTuple):
 GROUNDS = {
     "paving": GroundKind((140, 148, 156), (0.2, 0.7), 0.6, 0.2, 0.22, 0.0),
     "tiles": GroundKind((150, 160, 172), (0.25, 0.6), 1.0, 0.3, 0.1, 0.05),
-    "asphalt": GroundKind((96, 96, 96), (0.0, 0.0), 1.0, 0.0, 0.32, 0.0),
+    "asphalt": GroundKind((96, 96, 96), (0.0, 0.0), 1.0, 0.0, 0.22, 0.0),
     "concrete": GroundKind((158, 164, 166), (2.0, 4.0), 1.0, 0.07, 0.14, 0.0),
-    "gravel": GroundKind((118, 142, 156), (0.0, 0.0), 1.0, 0.0, 0.5, 0.0),
+    "gravel": GroundKind((118, 142, 156), (0.0, 0.0), 1.0, 0.0, 0.4, 0.0),
     "grass": GroundKind((64, 112, 96), (0.0, 0.0), 1.0, 0.0, 0.45, 0.0),
     "floor": GroundKind((168, 176, 182), (0.6, 1.2), 1.0, 0.06, 0.04, 0.35),
 }

@@ -32,7 +32,7 @@ from sim.scene.body import recorded_bodies
 from sim.types import BACKGROUNDS, Array, Camera, Image, Ints, Motion, PixelTruth
 
 if TYPE_CHECKING:
-    from scenarios.schema.scenario import Light, Picture
+    from scenarios.schema.pictures import Light, Picture
 
 
 FRAMES = 16  # frames of a batch
@@ -78,7 +78,7 @@ class Renderer:
         self, motion: Motion, camera: Camera, light: Light | None = None, picture: Picture | None = None
     ) -> None:
         """Takes light and picture as in a scenario, None: the default; raises InputError if the lens distorts."""
-        from scenarios.schema.scenario import Light, Picture
+        from scenarios.schema.pictures import Light, Picture
 
         if camera.radial != 0:
             raise InputError(

@@ -25,7 +25,7 @@ from sim.scene.raycast import pixel_rays, signed_scale, solids_of
 from sim.types import Array, Camera, Scene
 
 if TYPE_CHECKING:
-    from scenarios.schema.scenario import Light, Picture
+    from scenarios.schema.pictures import Light, Picture
 
 WAVES = 24
 

@@ -184,7 +184,7 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
 def _light(folder: Path, manifest: dict[str, Any]) -> Array:
     # Drawn again from the stored scenario; imported here, as few readers need it.
     from scenarios.loading.toml_files import parse
-    from scenarios.schema.scenario import Light
+    from scenarios.schema.pictures import Light
     from sim.render.weather import brightness
 
     table, about = parse(folder / "scenario.toml"), manifest["sequence"]

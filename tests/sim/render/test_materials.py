@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_erosion
 
-from scenarios.schema.scenario import Light, Picture
+from scenarios.schema.pictures import Light, Picture
 from sim.hashing import canonical_hash
 from sim.render.camera_view import blur_weights
 from sim.render.renderer import Renderer

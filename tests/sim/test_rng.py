@@ -7,7 +7,7 @@ import numpy as np
 import sim
 from scenarios import load
 from scenarios.loading.toml_files import dump
-from scenarios.schema.scenario import Light, Picture
+from scenarios.schema.pictures import Light, Picture
 from sim.hashing import canonical_hash
 from sim.render.renderer import Renderer
 from tests.reference_sense import crowd, pinhole, small
