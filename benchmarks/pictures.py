@@ -2,6 +2,7 @@
 
     python -m benchmarks pictures exactness [--seed 40000] [--step 20] [scenario …]
     python -m benchmarks pictures gallery [--out docs/rendering.jpg]
+    python -m benchmarks pictures looks [--out docs/guides/looks.jpg]
     python -m benchmarks pictures trackers
     python -m benchmarks pictures guides
 
@@ -15,8 +16,9 @@ visible / amodal pixels, of people with at least 50 amodal pixels and no part ou
 visibility samples a grid of 16 x 32 points per person, orders people by distance, and takes people behind stairs for
 flat.
 gallery: one frame of several scenarios, most of them the quarter with most people; of `crowd` also the ids (left half)
-and disparities (right half, black where unknown). trackers: the idea of each tracker, in docs/trackers. guides:
-pictures of docs/guides, and of docs/start with the data of their replays.
+and disparities (right half, black where unknown). looks: one frame of each of 24 entries of the suite looks. trackers:
+the idea of each tracker, in docs/trackers. guides: pictures of docs/guides, and of docs/start with the data of their
+replays.
 """
 
 from __future__ import annotations
@@ -30,10 +32,11 @@ import numpy as np
 from benchmarks.support import guide_pictures, idea_pictures
 from benchmarks.support.options import new_parser
 from benchmarks.support.tables import head, row
-from scenarios.loading.resolve import load, names
+from scenarios.loading.resolve import load, names, resolve
 from sim.crowd.world import run
 from sim.render.renderer import Renderer
 from sim.scene.camera_placement import place_camera
+from sim.sequence import simulate
 from sim.truth.label import bodies
 from sim.types import Camera, Motion
 from tests import reference_render
@@ -42,6 +45,7 @@ FRAMES = {"crowd": 60, "stairs": 110, "pillar": 80, "lights": 60, "mixed": 80, "
 WHOLE = ("stairs", "clutter")  # not cut
 GALLERY_SEED, QUALITY = 40_001, 82
 LEAST_PX = 50
+SHEET, LOOK = (4, 6), 25  # rows and columns of the sheet of looks; its frames' number
 COLUMNS = "scenario", "ids", "disparity", "px", "box", "people", "mean", "abs", "95 %", "largest"
 
 
@@ -146,8 +150,17 @@ def gallery(args: argparse.Namespace) -> None:
             cells.append(truth_picture(made, index, near))
     pairs = [np.hstack(cells[k : k + 2]) for k in range(0, len(cells), 2)]
     small = cv2.resize(np.vstack(pairs), None, fx=0.75, fy=0.75, interpolation=cv2.INTER_AREA)
-    cv2.imwrite(str(args.out), small, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
-    print(args.out)
+    cv2.imwrite(str(args.out or "docs/rendering.jpg"), small, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+
+
+def looks(args: argparse.Namespace) -> None:
+    cells = []
+    for entry in resolve("suite:looks")[:: 200 // SHEET[0] // SHEET[1]][: SHEET[0] * SHEET[1]]:
+        sequence = simulate(entry.scenario, GALLERY_SEED, entry.repeat)
+        frame = next(frame for frame in sequence.frames() if frame.index == LOOK)
+        cells.append(cv2.resize(frame.image, (240, 180), interpolation=cv2.INTER_AREA))
+    rows = [np.hstack(cells[k : k + SHEET[1]]) for k in range(0, len(cells), SHEET[1])]
+    cv2.imwrite(str(args.out or "docs/guides/looks.jpg"), np.vstack(rows), [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
 
 
 def trackers(_: argparse.Namespace) -> None:
@@ -161,7 +174,7 @@ def guides(_: argparse.Namespace) -> None:
         print(path)
 
 
-MODES = {"exactness": exactness, "gallery": gallery, "trackers": trackers, "guides": guides}
+MODES = {"exactness": exactness, "gallery": gallery, "looks": looks, "trackers": trackers, "guides": guides}
 
 
 def main() -> None:
@@ -170,7 +183,7 @@ def main() -> None:
     parser.add_argument("scenario", nargs="*", help="exactness: of the catalogue; all by default")
     parser.add_argument("--seed", type=int, default=40_000, help="exactness: seed of every scenario")
     parser.add_argument("--step", type=int, default=20, help="exactness: frames from one compared to the next")
-    parser.add_argument("--out", type=Path, default=Path("docs/rendering.jpg"), help="gallery: the picture")
+    parser.add_argument("--out", type=Path, help="gallery, looks: the picture")
     args = parser.parse_intermixed_args()
     MODES[args.mode](args)
 

@@ -41,6 +41,7 @@ from scenarios.loading.resolve import resolve
 from scenarios.loading.toml_files import Setting
 from scenarios.schema.scenario import Scenario
 from sim.render.weather import brightness
+from sim.rng import look_seed
 from sim.sequence import simulate
 from sim.types import Array, Sequence, Tracks, Truth
 from tracking.episodes.sources import Source
@@ -254,7 +255,7 @@ def light_changes(scenario: Scenario, seed: int, frames: SequenceOf[int]) -> boo
     """Returns True if the brightness changes by more than a tenth within a second of one of the frames."""
     assert scenario.camera.fps is not None
     fps = scenario.camera.fps
-    light = brightness(scenario.light, seed, 0, fps, round(scenario.duration * fps))
+    light = brightness(scenario.light, look_seed(seed, scenario.name), 0, fps, round(scenario.duration * fps))
     around = (light[max(k - 1 - round(fps), 0) : k + round(fps)] for k in frames)
     return any(float(near.max() / near.min()) > CHANGE for near in around)
 

@@ -8,12 +8,15 @@ from __future__ import annotations
 import zlib
 from typing import TYPE_CHECKING, Any
 
-from sim.rng import draw, rng
+from sim.rng import draw, look_seed, rng
 
 if TYPE_CHECKING:
     import numpy as np
 
     from scenarios.schema.scenario import Scenario
+
+
+LOOKS = ("light.", "picture.", "looks.")  # keys of what is seen, not of how people walk: drawn for each scenario anew
 
 
 def drawn(scenario: Scenario, seed: int, repeat: int = 0) -> Scenario:
@@ -29,7 +32,8 @@ def drawn(scenario: Scenario, seed: int, repeat: int = 0) -> Scenario:
     from scenarios.schema.values import Distribution
 
     def stream(name: str) -> np.random.Generator:
-        return rng(seed, "draw", zlib.crc32(name.encode()), repeat=repeat)
+        own = look_seed(seed, scenario.name) if name.startswith(LOOKS) else seed
+        return rng(own, "draw", zlib.crc32(name.encode()), repeat=repeat)
 
     def value(key: str, given: dict[str, Any]) -> Any:
         if "link" in given:

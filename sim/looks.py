@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from sim.elementary import dot, length, unit
-from sim.rng import draw, rng
+from sim.rng import draw, look_seed, rng
 from sim.scene.figure import DISTRACTORS, HELD, THINGS, WORN
 from sim.types import Array, Looks, Motion, Scene
 
@@ -35,7 +35,8 @@ def with_looks(motion: Motion, spec: LooksSpec | None) -> Motion:
     if spec is None:
         return motion
     columns = range(motion.present.shape[1])
-    streams = [rng(motion.seed, "looks", PEOPLE, k + 1, repeat=motion.repeat) for k in columns]
+    seed = look_seed(motion.seed, motion.name)
+    streams = [rng(seed, "looks", PEOPLE, k + 1, repeat=motion.repeat) for k in columns]
     start, u = np.empty(len(columns)), np.empty((len(columns), len(WORN) + len(HELD)))
     clothes = np.full((len(columns), 2, 3), np.nan) if motion.clothes is None else motion.clothes.copy()
     for k, source in enumerate(streams):
@@ -88,14 +89,15 @@ class _Distractor(NamedTuple):
 
 def _distractors(motion: Motion, spec: Distractors) -> list[_Distractor]:
     found: list[_Distractor] = []
+    seed = look_seed(motion.seed, motion.name)
     rate = max(round(motion.fps / 2), 1)  # places are compared twice a second
     t = np.arange(len(motion.present)) / motion.fps
     taken = np.concatenate([motion.pos[::rate], _solid_points(motion.scene, len(t[::rate]))], axis=1)
     for name in DISTRACTORS:
-        source = rng(motion.seed, "looks", PLACES, THINGS.index(name), repeat=motion.repeat)
+        source = rng(seed, "looks", PLACES, THINGS.index(name), repeat=motion.repeat)
         wanted = draw(getattr(spec, name), source)
         for number in range(1, int(wanted + source.random()) + 1):
-            source = rng(motion.seed, "looks", PLACES, THINGS.index(name), number, repeat=motion.repeat)
+            source = rng(seed, "looks", PLACES, THINGS.index(name), number, repeat=motion.repeat)
             moves, speed = WALKING.get(name, (0.0, 0.0))
             low, high = SIZES.get(name, (1.0, 1.0))
             size, speed = low + (high - low) * source.random(), speed * (source.random() < moves)

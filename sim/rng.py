@@ -7,6 +7,7 @@ depend on the processor.
 
 from __future__ import annotations
 
+import zlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -34,6 +35,14 @@ def rng(seed: int, role: str, *keys: int, repeat: int = 0) -> np.random.Generato
     """
     spawn_key = (ROLE[role], *keys) if repeat == 0 else (ROLE[role], *keys, 1_000_000 + repeat)
     return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=spawn_key))
+
+
+def look_seed(seed: int, scenario: str) -> int:
+    """Returns the seed of all that is drawn for pictures alone; it differs between scenarios of one seed.
+
+    scenario: the scenario's name, as it is stored, so that a stored sequence is drawn again with its own looks.
+    """
+    return (seed << 32) + zlib.crc32(scenario.encode())
 
 
 def uniforms(r: np.random.Generator, shape: int | tuple[int, ...]) -> Array:

@@ -14,6 +14,7 @@ import numpy as np
 from sim.clock import check_stride, every_nth
 from sim.draws import drawn
 from sim.looks import with_looks
+from sim.rng import look_seed
 from sim.scene.camera import px_per_m_at_centre
 from sim.scene.camera_placement import place_camera
 from sim.streams import check_streams
@@ -151,7 +152,9 @@ def observe(
     def light() -> Array:
         from sim.render.weather import brightness
 
-        return brightness(scenario.light, motion.seed, motion.repeat, kept.fps, len(kept.present))
+        return brightness(
+            scenario.light, look_seed(motion.seed, motion.name), motion.repeat, kept.fps, len(kept.present)
+        )
 
     def truth() -> Truth:
         found = label(kept, camera)

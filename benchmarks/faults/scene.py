@@ -11,6 +11,7 @@ from scenarios import load
 from sim import simulate
 from sim.geometry.polygons import footprint_hulls
 from sim.render.weather import draw_illumination
+from sim.rng import look_seed
 from sim.types import EVENT_KINDS, Array, Bools, Groups, Ints, Sequence, Tracks
 from tracking.grouping.grouped_tracks import groups_in_frames
 
@@ -127,7 +128,7 @@ def scene(name: str, seed: int, fps: float) -> FaultScene:
         sequence, truth.fps, people, there, pos, dense(truth.vel, np.nan), dense(truth.visibility, 1.0),
         dense(truth.truncation, 0.0), dense(truth.group, NOBODY).astype(np.int64),
         np.nan_to_num(distance, nan=np.inf).min(axis=2),
-        tuple(int(start * fps) for start, _, _ in draw_illumination(scenario.light, seed).switches),
+        tuple(int(start * fps) for start, _, _ in draw_illumination(scenario.light, look_seed(seed, name)).switches),
     )  # fmt: skip
 
 

@@ -14,98 +14,17 @@ from pydantic.json_schema import SkipJsonSchema
 from scenarios.limits import FRAME_RATES, PEOPLE, PICTURE_SIZES, fits_picture
 from scenarios.schema.colours import Colours
 from scenarios.schema.looks import LooksSpec
+from scenarios.schema.pictures import Light, Picture
 from scenarios.schema.sensor import Sensor
 
 # isort: off
 # fmt: off
 from scenarios.schema.values import (
-    Distribution, FixedPoint, Model, Name, NonNegative, Pattern, Point, Positive, Share, Side, Value, bounds, problem,
+    Distribution, FixedPoint, Model, Name, NonNegative, Pattern, Point, Positive, Side, Value, bounds, problem,
     within,
 )
 # fmt: on
 # isort: on
-
-Pixels = Annotated[float, within(0.0, 100.0, " px")]
-
-
-class LightSwitch(Model):
-    """A sudden change of brightness, as of a lamp or a cloud; the factors of several switches are multiplied.
-
-    Attributes:
-        at: time of the change, s
-        gain: factor of the brightness from then on; above 0
-        ramp: duration of the change, s
-    """
-
-    at: Value
-    gain: Annotated[Value, within(1e-3, 1000.0)]
-    ramp: NonNegative = 0.2
-
-
-class Light(Model):
-    """The light on the scene; it changes pictures only.
-
-    Attributes:
-        sun_azimuth_deg: direction from which the light comes; 0 = from +x, 90 = from +y
-        sun_elevation_deg: angle of the sun above the ground
-        shadow: share of the brightness that the ground loses in a cast shadow; 0 = no shadows
-        penumbra: width of a shadow's soft edge, m
-        drift: standard deviation of slow changes of brightness, relative
-        drift_time: time constant of slow changes, s
-        flicker: standard deviation of changes of brightness from frame to frame, relative
-        cloud: standard deviation of the brightness of soft patches that move over the ground, relative
-        cloud_size: size of the patches: distance at which their correlation is 0.6, m
-        cloud_speed: speed of the patches, m/s
-        switch: sudden changes of brightness
-    """
-
-    sun_azimuth_deg: Value = Distribution(uniform=(-180, 180))
-    sun_elevation_deg: Annotated[Value, within(0.1, 90.0, " degrees")] = Distribution(uniform=(35, 60))
-    shadow: Share = 0.3
-    penumbra: Annotated[float, within(0.0, 100.0, " m")] = 0.05
-    drift: NonNegative = 0.0
-    drift_time: Positive = 20.0
-    flicker: NonNegative = 0.0
-    cloud: Annotated[Value, within(0.0, 10.0)] = 0.0
-    cloud_size: Positive = 8.0
-    cloud_speed: Annotated[float, within(0.0, 1000.0, " m/s")] = 1.0
-    switch: tuple[LightSwitch, ...] = ()
-
-
-class Picture(Model):
-    """Texture, noise, blur and artefacts; they change pictures only.
-
-    The noise at grey level x has the variance noise² (1 - shot + shot x / 128). True disparities are those of a pair
-    without the errors right_….
-
-    Attributes:
-        texture: contrast of the patterns on ground and walls
-        samples: rays along each axis of a pixel of the empty scene, averaged; with more, patterns are finer
-        noise: standard deviation of the noise of each pixel and colour channel at grey level 128, grey levels
-        shot: share of that noise's variance that is proportional to the brightness
-        blur_px: standard deviation of the blur, px
-        jpeg: quality of JPEG compression, which adds artefacts; 0 = no compression
-        foliage: share of the image that is covered by plants moving in the wind; on the ground only
-        sway_px: standard deviation of the plants' movement along each axis, px
-        sway_time: time after which the correlation of that movement is 0.6, s
-        right_gain: factor of the right picture's brightness, which is not calibrated
-        right_roll_deg: angle by which the right picture's content is turned clockwise, which is not calibrated
-        right_down_px: distance by which the right picture's content lies too low, px, which is not calibrated
-    """
-
-    texture: Share = 0.5
-    samples: Annotated[int, Field(ge=1, le=4)] = 1
-    noise: Annotated[float, within(0.0, 255.0, " grey levels")] = 3.0
-    shot: Share = 0.5
-    blur_px: Pixels = 0.6
-    jpeg: Annotated[int, Field(ge=0, le=100)] = 0
-    foliage: Annotated[Value, within(0.0, 1.0)] = 0.0
-    sway_px: Pixels = 1.5
-    sway_time: Positive = 0.4
-    right_gain: Annotated[float, within(1e-3, 1000.0)] = 1.0
-    right_roll_deg: Annotated[float, within(-10.0, 10.0, " degrees")] = 0.0
-    right_down_px: Annotated[float, within(-100.0, 100.0, " px")] = 0.0
-
 
 FASTEST = 10.0  # m/s: as fast as a sprinter
 Speed = Annotated[Value, within(0.05, FASTEST, " m/s")]

@@ -41,16 +41,16 @@ def _with_noise(x, grain, read, slope):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def _show_line(line, gain, grain, shot, many, out):  # type: ignore[no-untyped-def]
-    """Sets out to a line of canvas values times gain (many,) plus noise, as grey levels."""
+def _show_line(line, gain, lift, grain, shot, many, out):  # type: ignore[no-untyped-def]
+    """Sets out to a line of canvas values times gain (many,), plus lift, plus noise, as grey levels."""
     read, slope = ONE - shot, shot * GREY
     for i in range(many):
-        out[i] = _with_noise(np.float32(line[i]) * gain[i], grain[i], read, slope)
+        out[i] = _with_noise(np.float32(line[i]) * gain[i] + lift, grain[i], read, slope)
 
 
 @njit(cache=True)
-def brightness_row(nodes, step, v, width, out):  # type: ignore[no-untyped-def]
-    """Sets out to the brightness of image row v, three equal numbers per pixel, linear between nodes (J, I)."""
+def brightness_row(nodes, step, v, width, cast, out):  # type: ignore[no-untyped-def]
+    """Sets out to the brightness of image row v times cast (3,), B, G, R per pixel, linear between nodes (J, I)."""
     y = (v + np.float32(0.5)) / np.float32(step)
     j = min(int(y), nodes.shape[0] - 2)
     b = np.float32(y - j)
@@ -59,7 +59,7 @@ def brightness_row(nodes, step, v, width, out):  # type: ignore[no-untyped-def]
         rise = (nodes[j, i + 1] + b * (nodes[j + 1, i + 1] - nodes[j, i + 1]) - low) / np.float32(step)
         for u in range(i * step, min((i + 1) * step, width)):
             bright = low + rise * (np.float32(u - i * step) + HALF)
-            out[3 * u], out[3 * u + 1], out[3 * u + 2] = bright, bright, bright
+            out[3 * u], out[3 * u + 1], out[3 * u + 2] = bright * cast[0], bright * cast[1], bright * cast[2]
 
 
 @njit(cache=True)
@@ -118,20 +118,25 @@ def blur_all(canvas, weights, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def finish_image(canvas, empty, dirty, weights, nodes, step, noise, shot, offsets, out):  # type: ignore[no-untyped-def]
+def finish_image(  # type: ignore[no-untyped-def]
+    canvas, empty, dirty, weights, nodes, step, cast, lift, noise, shot, offsets, out
+):
     """Sets out (H, 3 W) uint8 to the image: the blurred canvas times brightness, plus noise, clipped to 0 … 255.
 
     canvas (H, 3 W) int16: the sharp scene. empty (H, 3 W) int16: the blurred empty scene, for clean tiles. dirty: tiles
-    to blur anew. nodes (J, I): brightness at every `step`-th pixel, (1, 1) if it is the same everywhere. noise: the
+    to blur anew. nodes (J, I): brightness at every `step`-th pixel, (1, 1) if it is the same everywhere. cast (3,):
+    further factors of B, G, R. lift: added to all, grey levels times UNIT. noise: the
     pool, which row v reads from offsets[v] on. shot: share of the noise's variance that grows with brightness.
     """
     height, width = canvas.shape[0], canvas.shape[1] // 3
     edge, wide, tile = _scratch(len(weights) // 2, width)
-    bright, uniform = np.full((TILE_H, 3 * width), nodes[0, 0], np.float32), nodes.size == 1
+    bright, uniform = np.empty((TILE_H, 3 * width), np.float32), nodes.size == 1
+    for i in range(3 * width):
+        bright[:, i] = nodes[0, 0] * cast[i % 3]
     for top in range(0, height, TILE_H):
         rows, marks = min(TILE_H, height - top), dirty[top // TILE_H]
         for r in range(0 if uniform else rows):
-            brightness_row(nodes, step, top + r, width, bright[r])
+            brightness_row(nodes, step, top + r, width, cast, bright[r])
         last = 0
         while last < width:  # runs of tiles, dirty or clean
             left, drawn = last, marks[last // TILE_W]
@@ -144,6 +149,6 @@ def finish_image(canvas, empty, dirty, weights, nodes, step, noise, shot, offset
                 grain, to = noise[offsets[top + r] + 3 * left :], out[top + r, 3 * left :]
                 gain = bright[r, 3 * left :]
                 if drawn:
-                    _show_line(tile[r], gain, grain, shot, 3 * cols, to)
+                    _show_line(tile[r], gain, lift, grain, shot, 3 * cols, to)
                 else:
-                    _show_line(empty[top + r, 3 * left :], gain, grain, shot, 3 * cols, to)
+                    _show_line(empty[top + r, 3 * left :], gain, lift, grain, shot, 3 * cols, to)

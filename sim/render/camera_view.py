@@ -28,18 +28,17 @@ from numpy.typing import NDArray
 
 from scenarios.limits import PICTURE_SIDE
 from sim.render.canvas import MOST, TILE_H, TILE_W, UNIT, FrameCanvas
+from sim.render.materials import Style
 from sim.render.weather import Foliage, Illumination
 from sim.rng import rng
 from sim.scene.raycast import GROUND, NOTHING, PILLAR, WALL, PixelRays, Solids, pixel_rays, signed_scale, solids_of
 from sim.types import Array, Camera, Ints, Motion
 
 if TYPE_CHECKING:
-    from scenarios.schema.scenario import Picture
+    from scenarios.schema.pictures import Picture
 
 
 Floats = NDArray[np.float32]
-
-MATERIALS = 0  # key of the random role "texture"; people have the keys from 1 on
 
 
 @dataclass(frozen=True)
@@ -66,12 +65,20 @@ FRAMES_PER_DRAW = 16  # frames whose offsets are drawn in one call
 LONGEST = 3 * PICTURE_SIDE  # numbers that a row may need: 3 colours, the widest image
 
 
-def blur_weights(sd: float) -> NDArray[np.float32]:
-    """Returns the weights (2 r + 1,), sum 1, of a Gaussian blur of standard deviation `sd` px; r = 3 sd, rounded up."""
-    radius = int(np.ceil(3 * sd))
+def blur_weights(sd: float, sharpen: float = 0.0) -> NDArray[np.float32]:
+    """Returns the weights (2 r + 1,), sum 1, of a Gaussian blur of standard deviation `sd` px; r = 3 sd, rounded up.
+
+    sharpen: by how much the difference from a blur of 2 sd + 0.5 px is enhanced; r is that blur's.
+    """
+    wide = 2 * sd + 0.5
+    radius = int(np.ceil(3 * (wide if sharpen > 0 else sd)))
     x = np.arange(-radius, radius + 1)
-    weights = np.exp(-0.5 * (x / sd) ** 2) if radius else np.ones(1)
-    return np.asarray(weights / weights.sum(), np.float32)
+
+    def gauss(sd: float) -> Array:
+        weights = np.exp(-0.5 * (x / sd) ** 2) if sd else (x == 0) * 1.0
+        return np.asarray(weights / weights.sum())
+
+    return np.asarray(gauss(sd) if sharpen == 0 else (1 + sharpen) * gauss(sd) - sharpen * gauss(wide), np.float32)
 
 
 @cache
@@ -91,7 +98,7 @@ def _offsets_of_frames(rows: int, seed: int, side: int, draw: int, repeat: int) 
     return rng(seed, "noise", side, draw, repeat=repeat).integers(POOL, size=(FRAMES_PER_DRAW, rows))
 
 
-def noise_offsets(rows: int, seed: int, side: int, frame: int, repeat: int = 0) -> Ints:
+def noise_offsets(rows: int, seed: int, repeat: int, side: int, frame: int) -> Ints:
     """Returns the index in the noise pool at which the noise of each image row begins, (rows,).
 
     side: 0 the left camera, 1 the right one. frame: number from 1 plus BACKGROUNDS; background images have 1 to 50.
@@ -107,14 +114,15 @@ class CameraView:
     """The empty scene as one camera sees it; each part is computed when first needed, and kept.
 
     State: canvases that were given back, for the next frame. side: 0 the left camera, 1 the right one. plants is None
-    without plants.
+    without plants. materials: of `draw_materials`.
     """
 
     def __init__(
-        self, camera: Camera, side: int, motion: Motion, light: Illumination, picture: Picture, plants: Foliage | None
-    ) -> None:
+        self, camera: Camera, side: int, motion: Motion, light: Illumination, picture: Picture, plants: Foliage | None,
+        materials: tuple[Array, Style],
+    ) -> None:  # fmt: skip
         self.camera, self.side, self.motion = camera, side, motion
-        self.light, self.picture, self.plants = light, picture, plants
+        self.light, self.picture, self.plants, self.materials = light, picture, plants, materials
         self.width, self.height = camera.image
         self.rays: PixelRays = pixel_rays(camera)
         self.solids: Solids = solids_of(motion.scene)
@@ -144,27 +152,20 @@ class CameraView:
 
         size = self.height, self.width
         depth, kind, place = np.empty(size, np.float32), np.empty(size, np.uint8), np.empty((3, *size), np.float32)
-        trace_pixels(self.rays, self.solids, depth, kind, place)
+        trace_pixels(self.rays, self.solids, self.materials[1], depth, kind, place)
         return PixelGeometry(depth, kind, place)
 
     @cached_property
     def empty_scene(self) -> EmptyScene:
         """The painted empty scene under steady light, with unmoved plants."""
-        from sim.render.empty_scene_kernels import PALETTE, SLAB_WIDTHS, SPREAD, paint_pixels
+        from sim.render.empty_scene_kernels import paint_pixels
 
-        size, light, plants = (self.height, self.width), self.light, self.plants
+        size, light = (self.height, self.width), self.light
         colour, direct, green = np.empty((*size, 3), np.float32), *np.empty((2, *size), np.float32)
-        source = rng(self.motion.seed, "texture", MATERIALS, repeat=self.motion.repeat)
-        shades = source.normal(size=(len(PALETTE), 1)), 0.3 * SPREAD * source.normal(size=(len(PALETTE), 3))
-        palette = PALETTE + SPREAD * shades[0] + shades[1]
-        slab = float(source.choice(SLAB_WIDTHS))
-        key = int(source.integers(1 << 20))
-        # In the order of the slots CONTRAST, SLAB_WIDTH, PLANT_KEY, PLANT_LEVEL.
-        style = np.array([self.picture.texture, slab, *((plants.key, plants.level) if plants else (0.0, np.inf))])
+        palette, style = self.materials
         paint_pixels(
             self.rays, self.picture.samples, signed_scale(self.camera), light.sun, light.shadow, light.penumbra,
-            self.solids, np.array(self.motion.scene.size, dtype=float), style, np.clip(palette, 20, 240), key,
-            colour, direct, green,
+            self.solids, np.array(self.motion.scene.size, dtype=float), style, palette, colour, direct, green,
         )  # fmt: skip
         return EmptyScene(colour, direct, green)
 
@@ -179,7 +180,9 @@ class CameraView:
         from sim.render.blur_noise_kernels import blur_all
 
         out, flat = np.empty_like(self.empty_canvas), (self.height, 3 * self.width)
-        blur_all(self.empty_canvas.reshape(flat), blur_weights(self.picture.blur_px), out.reshape(flat))
+        blur_all(
+            self.empty_canvas.reshape(flat), blur_weights(self.picture.blur_px, self.picture.sharpen), out.reshape(flat)
+        )
         return out
 
     @cached_property

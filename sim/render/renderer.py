@@ -12,7 +12,8 @@ people (`types.PixelTruth`).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -21,7 +22,8 @@ from numpy.typing import NDArray
 
 from scenarios.errors import InputError
 from sim.render.camera_view import NODE_STEP, CameraView, blur_weights, noise_offsets, noise_pool
-from sim.render.canvas import UNIT, FrameCanvas
+from sim.render.canvas import MID_GREY, UNIT, FrameCanvas
+from sim.render.materials import SKY, Style, draw_materials
 
 # isort: off
 # fmt: off
@@ -30,17 +32,19 @@ from sim.render.people import (
 )
 # fmt: on
 # isort: on
-from sim.render.weather import Foliage, Illumination, draw_illumination, grow_plants
+from sim.render.weather import Foliage, Illumination, draw_illumination, grow_plants, rain_drops
+from sim.rng import look_seed
 from sim.scene import camera as cameras
 from sim.scene.body import RecordedBodies, recorded_bodies, recorded_things
 from sim.scene.figure import TOPS
 from sim.types import BACKGROUNDS, Array, Camera, Image, Ints, Motion, PixelTruth
 
 if TYPE_CHECKING:
-    from scenarios.schema.scenario import Light, Picture
+    from scenarios.schema.pictures import Light, Picture
 
 
 FRAMES = 16  # frames of a batch
+SHOTS = 5  # moments of a frame whose mean is the picture, if the shutter stays open
 
 
 def pixel_truth(ids: Ints, rows: Ints, seen: PeopleInView, amodal: Ints, disparity: Array | None) -> PixelTruth:
@@ -83,14 +87,14 @@ class Renderer:
 
     State: everything that is the same in all frames, computed when first needed, and the people of the batch of frames
     drawn last (batches begin at frame 1, 17, 33, …), as each view sees them. Random values of light and picture are
-    drawn with the Motion's seed.
+    drawn with the Motion's seed and name (`sim.rng.look_seed`).
     """
 
     def __init__(
         self, motion: Motion, camera: Camera, light: Light | None = None, picture: Picture | None = None
     ) -> None:
         """Takes light and picture as in a scenario, None: the default; raises InputError if the lens distorts."""
-        from scenarios.schema.scenario import Light, Picture
+        from scenarios.schema.pictures import Light, Picture
 
         if camera.radial != 0:
             raise InputError(
@@ -99,13 +103,14 @@ class Renderer:
             )  # fmt: skip
         self.motion, self.camera = motion, camera
         self.light, self.picture = light or Light(), picture or Picture()
+        self._look = look_seed(motion.seed, motion.name), motion.repeat
         self._first, self._bodies, self._things = 0, recorded_bodies(motion, 1, 1), recorded_things(motion, 1, 1)
         self._seen, self._shadows = dict[CameraView, list[Shown]](), dict[CameraView, list[PeopleShadows]]()
 
     @cached_property
     def illumination(self) -> Illumination:
         """The light that the seed of the motion gives."""
-        return draw_illumination(self.light, self.motion.seed, self.motion.repeat)
+        return draw_illumination(self.light, *self._look)
 
     @cached_property
     def left_view(self) -> CameraView:
@@ -126,7 +131,12 @@ class Renderer:
         return self._view(cameras.misaligned(self.right_view.camera, roll, down), 1)
 
     def _view(self, camera: Camera, side: int) -> CameraView:
-        return CameraView(camera, side, self.motion, self.illumination, self.picture, self._plants)
+        light, picture = self.illumination, self.picture
+        return CameraView(camera, side, self.motion, light, picture, self._plants, self._materials)
+
+    @cached_property
+    def _materials(self) -> tuple[Array, Style]:
+        return draw_materials(self.picture, self.light, self._plants, self.motion, self.camera, self._look)
 
     def check_pair(self) -> None:
         """Raises InputError if there is no right camera: kind "top", or a baseline of 0."""
@@ -138,12 +148,12 @@ class Renderer:
 
     @cached_property
     def _plants(self) -> Foliage | None:
-        return grow_plants(self.picture, self.camera, self.motion.scene, self.motion.seed, self.motion.repeat)
+        return grow_plants(self.picture, self.camera, self.motion.scene, *self._look)
 
     @cached_property
     def _atlas(self) -> NDArray[np.uint8]:
         m = self.motion
-        return clothing_atlas(m.present.shape[1], m.seed, m.repeat, m.clothes, m.looks)
+        return clothing_atlas(m.present.shape[1], *self._look, m.clothes, m.looks)
 
     @cached_property
     def _noise(self) -> NDArray[np.int16]:
@@ -151,7 +161,24 @@ class Renderer:
 
     @cached_property
     def _weights(self) -> NDArray[np.float32]:
-        return blur_weights(self.picture.blur_px)
+        return blur_weights(self.picture.blur_px, self.picture.sharpen)
+
+    @cached_property
+    def _cast(self) -> NDArray[np.float32]:
+        return np.array([1 - self.light.warmth, 1, 1 + self.light.warmth], np.float32)
+
+    @cached_property
+    def _while_open(self) -> list[Renderer]:
+        """Renderers of the same people a little earlier and later, while the shutter is open."""
+        step = self.picture.shutter / SHOTS
+        others = [copy(self) for _ in range(SHOTS - 1 if step > 0 else 0)]
+        for k, other in zip((-2, -1, 1, 2), others, strict=False):
+            other.motion = self.motion.replace(pos=self.motion.pos + k * step * self.motion.vel)
+            if (looks := self.motion.looks) is not None:
+                moved = looks.place + k * step * self.motion.fps * np.gradient(looks.place, axis=0)
+                other.motion = other.motion.replace(looks=replace(looks, place=moved))
+            other._first, other._seen, other._shadows = 0, {}, {}
+        return others
 
     @property
     def _margin(self) -> int:
@@ -255,7 +282,39 @@ class Renderer:
     def _draw(
         self, view: CameraView, index: int, *, shade: bool, label: bool, disparity: bool = False
     ) -> tuple[Image, PixelTruth | None]:
-        from sim.render.people_kernels import count_silhouettes, draw_people
+        canvas, ids, shown = self._draw_crowd(view, index, shade=shade, label=label)
+        image, truth = np.zeros((0, 0, 3), np.uint8), None
+        if shade:
+            self._add_other_moments(view, index, canvas)
+            image = self._finish(view, canvas, index)
+        if label:
+            from sim.render.people_kernels import count_silhouettes
+
+            found = self._disparities(canvas, ids, shown, index) if disparity else None
+            (seen, bodies), *_ = shown
+            rows, amodal = _rows(bodies, index), np.zeros(len(seen.id), np.int64)
+            count_silhouettes(rows, seen.outlines, view.width, amodal)
+            truth = pixel_truth(ids, rows, seen, amodal, found)
+        view.return_canvas(canvas)
+        return image, truth
+
+    def _add_other_moments(self, view: CameraView, index: int, canvas: FrameCanvas) -> None:
+        """Turns the colours of a canvas into the mean over the time for which the shutter is open."""
+        if not self._while_open:
+            return
+        total = canvas.colour.astype(np.int32)
+        for other in self._while_open:
+            moved = other._draw_crowd(view, index, shade=True, label=False)[0]
+            total += moved.colour
+            canvas.dirty[:] |= moved.dirty
+            view.return_canvas(moved)
+        canvas.colour[:] = total // SHOTS
+
+    def _draw_crowd(
+        self, view: CameraView, index: int, *, shade: bool, label: bool
+    ) -> tuple[FrameCanvas, Ints, list[Shown]]:
+        """Returns a canvas with the people and things of a frame, the id map, and both as the view sees them."""
+        from sim.render.people_kernels import draw_people
 
         shown = self._shown(view, index)
         canvas = self._moved_canvas(view, index) if shade else view.take_canvas()
@@ -267,30 +326,36 @@ class Renderer:
             rows = _rows(bodies, index)
             near_first = rows[np.argsort(seen.nearest[rows, 0], kind="stable")]
             draw_people(near_first, seen, shadow, self._atlas, shade, label, canvas, ids, self._margin)
-        image = self._finish(view, canvas, index) if shade else np.zeros((0, 0, 3), np.uint8)
-        truth = None
-        if label:
-            found = self._disparities(canvas, ids, shown, index) if disparity else None
-            seen, rows = shown[0][0], _rows(self._bodies, index)
-            amodal = np.zeros(len(seen.id), np.int64)
-            count_silhouettes(rows, seen.outlines, view.width, amodal)
-            truth = pixel_truth(ids, rows, seen, amodal, found)
-        view.return_canvas(canvas)
-        return image, truth
+        palette, style = self._materials
+        if shade and (style.fog > 0 or len(style.lamps)):
+            from sim.render.air_kernels import add_air
+
+            add_air(canvas, view.geometry.depth, view.rays, style, palette[SKY])
+        return canvas, ids, shown
 
     def _finish(self, view: CameraView, canvas: FrameCanvas, index: int) -> Image:
         from sim.render.blur_noise_kernels import finish_image
 
         image = np.empty((view.height, view.width, 3), np.uint8)
-        number = index + BACKGROUNDS
-        gain = np.float32(self.picture.right_gain if view.side else 1.0)
+        number, contrast = index + BACKGROUNDS, self.picture.contrast
+        if self.light.rain > 0:
+            from sim.render.air_kernels import draw_rain
+
+            drops = rain_drops(self.light.rain, view.camera.image, self._look, view.side, number)
+            draw_rain(drops, self._materials[0][SKY], canvas, self._margin)
+        gain = np.float32((self.picture.right_gain if view.side else 1.0) * self.light.level * contrast)
+        lift = np.float32((1 - contrast) * MID_GREY * UNIT)
         bright = view.brightness(self._time(index), number) * gain
-        offsets = noise_offsets(view.height, self.motion.seed, view.side, number, self.motion.repeat)
+        offsets = noise_offsets(view.height, *self._look, view.side, number)
         flat = view.height, 3 * view.width
         finish_image(
             canvas.colour.reshape(flat), view.blurred_canvas.reshape(flat), canvas.dirty, self._weights, bright,
-            NODE_STEP, self._noise, np.float32(self.picture.shot), offsets, image.reshape(flat),
+            NODE_STEP, self._cast, lift, self._noise, np.float32(self.picture.shot), offsets, image.reshape(flat),
         )  # fmt: skip
+        if self.picture.grey:
+            import cv2
+
+            image = np.repeat(cv2.cvtColor(image, cv2.COLOR_BGR2GRAY)[..., None], 3, axis=2)
         if self.picture.jpeg:
             import cv2
 

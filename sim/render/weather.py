@@ -25,7 +25,7 @@ from sim.scene.raycast import pixel_rays, signed_scale, solids_of
 from sim.types import Array, Camera, Scene
 
 if TYPE_CHECKING:
-    from scenarios.schema.scenario import Light, Picture
+    from scenarios.schema.pictures import Light, Picture
 
 WAVES = 24
 
@@ -83,7 +83,7 @@ def oscillation(source: np.random.Generator, sd: float, length: float, time: flo
     return _with_random_phases(source, sd, source.normal(size=(WAVES, 2)) / length, source.normal(size=WAVES) / time)
 
 
-SUN, DRIFT, FLICKER, SWITCH, CLOUD = range(5)  # keys of the random role "light"
+SUN, DRIFT, FLICKER, SWITCH, CLOUD, RAIN = range(6)  # keys of the random role "light"
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,7 @@ class Illumination:
     flicker: float  # standard deviation of the logarithm of brightness from frame to frame
     # sudden changes: (start s, end s, gain) each; gain is the factor of brightness from the end on
     switches: tuple[tuple[float, float, float], ...]
-    # seed, repeat : seed and number of the suite entry's copy (0: none); they name the random stream of the flicker
+    # seed, repeat : look seed and number of the suite entry's copy (0: none); they name the flicker's random stream
     seed: int
     repeat: int
 
@@ -117,7 +117,7 @@ class Illumination:
 
 
 def draw_illumination(light: Light, seed: int, repeat: int = 0) -> Illumination:
-    """Returns the light for a scenario's settings and a seed. repeat: number of the suite entry's copy, 0 without."""
+    """Returns the light for a scenario's settings and a `look_seed`. repeat: number of the suite entry's copy, or 0."""
     source = rng(seed, "light", SUN, repeat=repeat)
     azimuth, elevation = (np.deg2rad(draw(v, source)) for v in (light.sun_azimuth_deg, light.sun_elevation_deg))
     elevation = np.clip(elevation, np.deg2rad(0.1), np.pi / 2)  # one draw in a thousand may be beyond
@@ -137,6 +137,25 @@ def brightness(light: Light, seed: int, repeat: int, fps: float, length: int) ->
     """Returns the factor of brightness in each of the frames 1 … length, (length,), without clouds and flicker."""
     steady = replace(draw_illumination(light, seed, repeat), flicker=0.0)
     return np.array([steady.gain(k / fps, 0) for k in range(length)])
+
+
+RAIN_SLANT = 0.15  # px to the right per px downwards: standard deviation between sequences, five times that of drops
+RAIN_SHARES, RAIN_LENGTHS = (0.08, 0.3), (0.02, 0.07)  # of the sky's colour in a streak; of the picture's height
+
+
+def rain_drops(rain: float, size: tuple[int, int], look: tuple[int, int], side: int, frame: int) -> Array:
+    """Returns the streaks of one picture for `air_kernels.draw_rain`, (N, 5). rain: streaks in 10,000 px.
+
+    size: width and height, px. look: look seed and repeat. side, frame: as of `camera_view.noise_offsets`.
+    """
+    seed, repeat = look
+    wind = RAIN_SLANT * rng(seed, "light", RAIN, repeat=repeat).normal()
+    source = rng(seed, "light", RAIN, side, frame, repeat=repeat)
+    many = source.poisson(rain * size[0] * size[1] / 1e4)
+    low, high = np.transpose([RAIN_SHARES, np.array(RAIN_LENGTHS) * size[1], (0, 0), (-0.1, 1), (-0.1, 1)])
+    drops = source.uniform(low, high, (many, 5))
+    drops[:, 2] = wind + RAIN_SLANT / 5 * source.normal(size=many)
+    return np.asarray(drops)
 
 
 SAMPLE_STEP = 4  # px between the samples that decide where plants grow
@@ -161,7 +180,7 @@ class Foliage:
 
 
 def grow_plants(picture: Picture, camera: Camera, scene: Scene, seed: int, repeat: int = 0) -> Foliage | None:
-    """Returns the plants for a seed; None if their share is 0, or if no ground in view is near enough for plants."""
+    """Returns the plants of a `look_seed`; None if their share is 0, or no ground in view is near enough for plants."""
     source = rng(seed, "wind", PLACE, repeat=repeat)
     share = min(draw(picture.foliage, source), 1.0)
     if share <= 0:

@@ -17,6 +17,7 @@ from sim import hashing
 from sim.hashing import versions
 from sim.pictures.background_sample import BackgroundChoice
 from sim.pictures.stored_pictures import StoredPictures, write_pictures
+from sim.rng import look_seed
 from sim.store import atomic, seal, tables, truth_files
 from sim.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.store.group_files import IMMOBILE, NEVER_ARRIVES
@@ -183,8 +184,9 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
 def _light(folder: Path, manifest: dict[str, Any]) -> Array:
     # Drawn again from the stored scenario; imported here, as few readers need it.
     from scenarios.loading.toml_files import parse
-    from scenarios.schema.scenario import Light
+    from scenarios.schema.pictures import Light
     from sim.render.weather import brightness
 
-    light, about = Light.model_validate(parse(folder / "scenario.toml").get("light", {})), manifest["sequence"]
-    return brightness(light, manifest["seed"], manifest["repeat"], about["fps"], about["length"])
+    table, about = parse(folder / "scenario.toml"), manifest["sequence"]
+    light, seed = Light.model_validate(table.get("light", {})), look_seed(manifest["seed"], table["name"])
+    return brightness(light, seed, manifest["repeat"], about["fps"], about["length"])

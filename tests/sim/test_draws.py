@@ -101,3 +101,13 @@ def test_drawn_values_that_do_not_fit_each_other_are_refused_with_their_seed(pat
     late = ["duration={choice=[9, 4]}", "group.a.enter={link='late'}", "draw.late={choice=[0, 6.5]}"]
     with pytest.raises(InputError, match=r"scenario scene \(seed \d+\): group\.a\.enter: got 6\.5 s"):
         [drawn(load(path, late), seed) for seed in range(20)]
+
+
+def test_looks_are_drawn_for_each_scenario_anew(path: Path) -> None:
+    """Another name changes draws of light and picture, and no other."""
+    one = load(path, ["light.penumbra={uniform=[0, 1]}", "picture.noise={uniform=[0, 9]}"])
+    made, other = (drawn(scenario, 3) for scenario in (one, one.model_copy(update={"name": "other"})))
+    assert made.light.penumbra != other.light.penumbra
+    assert made.picture.noise != other.picture.noise
+    kept = {"name": made.name, "light": made.light, "picture": made.picture}
+    assert other.model_copy(update=kept) == made

@@ -8,6 +8,7 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load, resolve, rows, suite_names
+from sim.draws import drawn
 
 
 def suite(path: Path, text: str) -> str:
@@ -110,3 +111,11 @@ def test_rows_are_the_entries_without_copies(name: str) -> None:
         assert scenario.model_dump(exclude={"name"}) == entries[row].model_dump(exclude={"name"})
     contents = {scenario.model_dump_json(exclude={"name"}) for scenario in entries.values()}
     assert {scenario.model_dump_json(exclude={"name"}) for scenario in found.values()} == contents
+
+
+def test_no_two_sequences_of_the_suite_looks_are_alike() -> None:
+    entries = resolve("suite:looks")
+    made = [drawn(entry.scenario, 0, entry.repeat) for entry in entries[::10]]
+    assert len(entries) == 200
+    assert len({scenario.picture for scenario in made}) == len({scenario.light for scenario in made}) == 20
+    assert len({scenario.camera.height for scenario in made}) > 5

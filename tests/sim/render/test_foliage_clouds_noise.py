@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation, map_coordinates
 
-from scenarios.schema.scenario import Light, Picture
+from scenarios.schema.pictures import Light, Picture
 from sim.hashing import canonical_hash
 from sim.render.camera_view import NODE_STEP
 from sim.render.renderer import Renderer
 from sim.render.weather import draw_illumination
+from sim.rng import look_seed
 from sim.types import BACKGROUNDS, Motion, Scene
 from tests.reference_sense import above, crowd, pinhole, small
 
@@ -89,10 +90,11 @@ def test_clouds_pass_over_the_ground(view: str) -> None:
     made, clear = (Renderer(motion_in(0), VIEWS[view], one, CALM) for one in (light, DARK))
     place = np.moveaxis(made.left_view.geometry.place[:2], 0, -1).astype(float)
     plain = clear.frame(1).astype(float).sum(axis=2)
+    clouds = draw_illumination(light, look_seed(made.motion.seed, made.motion.name)).clouds
     near = (np.abs(place - [8, 5]) < [8, 5]).all(axis=2)
     for index in (1, 12):
         flat = place[near]
-        wanted = np.exp(draw_illumination(light, 7).clouds.sampled(flat, np.zeros(len(flat)))((index - 1) / 10))
+        wanted = np.exp(clouds.sampled(flat, np.zeros(len(flat)))((index - 1) / 10))
         image = made.frame(index).astype(float)
         found, shown = image.sum(axis=2)[near] / plain[near], (image < 255).all(axis=2)[near]
         assert shown.mean() > 0.8

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scenarios.errors import InputError
-from scenarios.schema.scenario import Light, LightSwitch, Picture
+from scenarios.schema.pictures import Light, LightSwitch, Picture
 from sim.hashing import canonical_hash
 from sim.render.renderer import BACKGROUNDS, Renderer
 from sim.truth.label import bodies
