@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.scene.body import ellipsoids, recorded_bodies, recorded_things
+from sim.scene.body import ellipsoids, outline_boxes, outlines, recorded_bodies, recorded_things
 from sim.scene.terrain import height_at
 from sim.types import Array, Bools, Camera, Ints, Motion, Scene
 
@@ -93,12 +93,15 @@ def cylinder(o: Array, d: Array, axis: Array, r: float, height: float) -> Array:
     return np.minimum(side, np.where((top > 0) & (d[:, 2] < 0) & ((at**2).sum(1) <= r * r), top, NEVER))
 
 
-def bodies(motion: Motion, index: int) -> list[tuple[int, Array, Array]]:
-    """(id, centre, shape) of each part of each person, and of each thing (id -2)."""
+def bodies(motion: Motion, index: int, camera: Camera | None = None) -> list[tuple[int, Array, Array]]:
+    """(id, centre, shape) of each part of each person, and of each thing (id -2) that is wholly before a camera."""
     if motion.looks is not None:
         people, things = (found(motion, index, index + 1) for found in (recorded_bodies, recorded_things))
         parts = [(int(id), people.shapes, k) for k, id in enumerate(people.id)]
-        parts += [] if things is None else [(-2, things.shapes, k) for k in range(len(things.id))]
+        if things is not None:
+            every = np.ones(len(things.id), bool)
+            whole = every if camera is None else np.isfinite(outline_boxes(outlines(camera, things.shapes))).all(axis=1)
+            parts += [(-2, things.shapes, k) for k in np.flatnonzero(whole)]
         return [(id, c, s) for id, b, k in parts for c, s in zip(b.centre[k], b.shape[k], strict=True)]
     who = np.flatnonzero(motion.present[index - 1])
     xy = motion.pos[index - 1, who]
@@ -113,7 +116,7 @@ def look(camera: Camera, motion: Motion, index: int) -> Seen:
     depth, solid = still(o, d, motion.scene)
     ids = np.where(solid, -2, 0)
     amodal: dict[int, Bools] = {}
-    for person, centre, shape in bodies(motion, index):
+    for person, centre, shape in bodies(motion, index, camera):
         t = ball(o, d, centre, shape)
         amodal[person] = amodal.get(person, np.zeros(len(t), bool)) | np.isfinite(t)
         ids, depth = np.where(t < depth, person, ids), np.minimum(t, depth)
@@ -134,7 +137,7 @@ def disparity(seen: Seen, camera: Camera, motion: Motion, index: int, gap: float
     d = (points - eye) / np.where(np.isfinite(depth), depth, 1.0)[:, None]  # depth 1 m per unit, as from the left
     o = np.tile(eye, (len(points), 1))
     first = still(o, d, motion.scene)[0]
-    for _, centre, shape in bodies(motion, index):
+    for _, centre, shape in bodies(motion, index, camera):
         first = np.minimum(first, ball(o, d, centre, shape))
     known = np.isfinite(depth) & (u >= 0) & (first >= depth - gap)
     return np.where(known, camera.focal_px[0] * camera.baseline / depth, np.nan).reshape(seen.depth.shape)
