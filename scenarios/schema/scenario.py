@@ -14,7 +14,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
 from scenarios.limits import FRAME_RATES, PEOPLE, PICTURE_SIZES, fits_picture
-from scenarios.schema.colours import Colours
+from scenarios.schema.colours import Colour, Colours
 from scenarios.schema.sensor import Sensor
 
 # isort: off
@@ -152,6 +152,33 @@ class StairsSpec(Model):
     slowdown: Annotated[float, Field(gt=0, le=1)] = 0.6
 
 
+Extent = Annotated[float, within(0.002, 1000.0, " m")]
+
+
+class BoxSpec(Model):
+    """A box, upright or tilted, such as a crate, a board, a rail or a wall of its own pattern. People do not avoid it.
+
+    Attributes:
+        at: middle of the box, x, y and height above the ground, m
+        size: width along its own x axis, depth along y, height along z, before it is turned, m
+        turn_deg: angle by which it is turned about the vertical; 0 = along the axes of the world
+        tilt_deg: angle by which it then leans over its own x axis; positive: its top moves towards its own +y
+        colour: name or "#rrggbb"
+        pattern: pattern of its sides: grain = irregular at all scales, plain = none, stripes, checks = repeated exactly
+        period: length after which stripes or checks repeat, m
+        gloss: share of the light that its sides mirror, of the empty scene and the sun; 0 = mat
+    """
+
+    at: tuple[float, float, float]
+    size: tuple[Extent, Extent, Extent]
+    turn_deg: float = 0.0
+    tilt_deg: Annotated[float, within(-90.0, 90.0, " degrees")] = 0.0
+    colour: Colour = "beige"
+    pattern: Literal["grain", "plain", "stripes", "checks"] = "grain"
+    period: Annotated[float, within(0.001, 100.0, " m")] = 0.2
+    gloss: Share = 0.0
+
+
 class WorldSpec(Model):
     """The immobile parts of the scene; by default an empty world.
 
@@ -162,6 +189,7 @@ class WorldSpec(Model):
         stairs: flights of stairs
         doors: openings in walls
         service: service points (counters), m
+        boxes: boxes that stand, lie, hang or lean; absent: none
         wall_height: height of the walls, m
         pillar_height: height of the pillars, m
     """
@@ -172,6 +200,7 @@ class WorldSpec(Model):
     stairs: tuple[StairsSpec, ...] = ()
     doors: tuple[DoorSpec, ...] = ()
     service: tuple[FixedPoint, ...] = ()
+    boxes: tuple[BoxSpec, ...] | None = None
     wall_height: Positive = 2.5
     pillar_height: Positive = 2.5
 

@@ -1,10 +1,10 @@
 """How much of each person a camera sees, computed from geometry alone, whether or not images are drawn.
 
 Each silhouette (body and head, `sim.scene.body`) is sampled on a grid over its amodal box. A sample is visible if it
-meets three conditions: it lies in the image; no nearer silhouette covers it; its line of sight meets no wall, pillar or
-step first. `sim.scene.body.occlusion_distance` orders people from near to far. A wall hides people beyond its line. A
-pillar hides people further away than the tangent to it. Stairs hide if the ray meets a step before the upright plane
-through the person that faces the camera. Seen from above, walls, pillars and stairs hide nobody.
+meets three conditions: it lies in the image; no nearer silhouette covers it; its line of sight meets no wall, pillar,
+step or box first. `sim.scene.body.occlusion_distance` orders people from near to far. A wall hides people beyond its
+line. A pillar hides people further away than the tangent to it. Stairs and boxes hide if the ray meets them before the
+upright plane through the person that faces the camera. Seen from above, people are hidden by people alone.
 
 Who is visible in a recording follows from the boxes alone: each is taken for an upright person of `sim.scene.body`
 whose body and head fill it. Of two people, the one whose box ends lower in the image is the nearer (flat ground, a
@@ -19,7 +19,7 @@ import numpy as np
 
 from sim.scene import body
 from sim.scene.body import Ellipsoids, Outlines
-from sim.scene.raycast import only_flights, solids_of, unprojection
+from sim.scene.raycast import solids_of, stairs_and_boxes, unprojection
 from sim.types import Array, Camera, Ints, Scene, Truth
 
 
@@ -46,12 +46,12 @@ def measure_visibility(
 
     ellipses = body.outlines(camera, shapes)
     box, solids, has_eye = body.outline_boxes(ellipses), solids_of(scene), camera.kind == "pinhole"
-    hides, climbs = has_eye and len(solids.walls) + len(solids.pillars) > 0, has_eye and len(solids.flights) > 0
+    hides, others = has_eye and len(solids.walls) + len(solids.pillars) > 0, stairs_and_boxes(solids)
     visibility, truncation, visible_box = sample_visibility(
         frame_starts(frame), box, np.ascontiguousarray(ellipses.centre), body.packed_inverse(ellipses.shape),
         body.occlusion_distance(camera, pos3, height), pos3[:, :2].copy(), np.array(camera.image, dtype=float),
         np.array(camera.position, dtype=float), unprojection(camera), solids if hides else None,
-        only_flights(solids.flights) if climbs else None,
+        others if has_eye and len(solids.flights) + len(solids.boxes) > 0 else None,
     )  # fmt: skip
     return BodyVisibility(box, visibility, truncation, visible_box)
 
