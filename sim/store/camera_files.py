@@ -74,6 +74,6 @@ def read_scene(path: Path) -> Scene:
     segments = list[tuple[Pair, Pair]]
     found = tables.read_values(
         path, "correct it", size=Pair, walls=segments, pillars=list[Triple], doors=segments, service=list[Pair],
-        stairs=list[_Stairs], wall_height=Number, pillar_height=Number, boxes=(list[_Box], []),
+        stairs=list[_Stairs], wall_height=Number, pillar_height=Number, boxes=(list[_Box], ()),
     )  # fmt: skip
     return Scene.of(found, found.walls, found.doors)

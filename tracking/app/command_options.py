@@ -352,6 +352,8 @@ class CocoOptions(Options, words="export coco", run="export:export_coco"):
     out: Path = FILE("File to write.", metavar="FILE.json")
     person_class: str | None = PERSON_CLASS()
     min_visibility: float = LEAST_VISIBLE(SMALLER.capitalize(), MIN_VISIBILITY)
+    part_size: int | None = option(
+        "Write files of N sequences each: FILE-0000.json, …. Default: one file.", None, low=1, metavar="N")
 
 
 class YoloOptions(Options, words="export yolo", run="export:export_yolo"):
