@@ -147,6 +147,7 @@ class GenerateOptions(PictureOptions, WorkerOptions, words="generate", run="data
     seeds: str = SEEDS(SEEDS_HELP)
     out: Path = OUT()
     stride: int = option("Store every N-th frame of the camera only.", 1, low=1, metavar="N")
+    pack: bool = option("Store shards of up to 100 sequences in place of a folder for each.", False)
 
 
 class TrackOptions(SceneOptions, BoxOptions, words="track"):

@@ -109,6 +109,9 @@ def _lists(labelled: list[LabelledPictures], root: Path, counts: _Counts) -> dic
         counts.videos += 1
         about = {"id": counts.videos, "name": sequence.name, "fps": sequence.fps, "length": sequence.length}
         videos.append(json_text({**about, **shape}))
+        outside = files and not files[min(files)].absolute().is_relative_to(root.absolute())
+        got, remedy = "pictures in a shard", "unpack it with tar, and export the folders"
+        reject(outside, root, got, "pictures in folders, which the file can name", remedy)
         for index in range(1, (sequence.length or 0) + 1):
             if files and index not in files:
                 continue
