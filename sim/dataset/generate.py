@@ -311,7 +311,7 @@ def generate(
         check_stride(stride, one.scenario.camera.fps)
         jobs.append(SequenceJob(output_path(folder, one.name, f"-s{seed:05d}"), one, seed, wanted, images, stride))
     with _dataset(root, folder):
-        packed = next(iter(packs.shards_in(folder)), None)
+        packed = next(folder.glob("*/*-s[0-9]*.tar"), None)
         reject(packed is not None, folder, "a packed dataset", "one of folders", "add --pack, or choose another --out")
         for job in jobs:
             stored_manifest(job)

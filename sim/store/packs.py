@@ -9,6 +9,7 @@ Readers unpack a shard into a temporary folder, which is deleted when the proces
 
 from __future__ import annotations
 
+import re
 import shutil
 import tarfile
 import tempfile
@@ -49,6 +50,11 @@ def shards_in(folder: Path) -> list[Path]:
 def is_shard(path: Path) -> bool:
     """Returns True if the path is a shard: a tar with a seal beside it that flockscope wrote."""
     return path.suffix == ".tar" and path.is_file() and bool(is_ours(seal_of(path)))
+
+
+def is_named_as_shard(path: Path) -> bool:
+    """Returns True if the path has the name of a shard, whether or not a seal is beside it."""
+    return re.fullmatch(re.escape(path.parent.name) + r"-s\d{5,}\.tar", path.name) is not None
 
 
 class ShardWriter:

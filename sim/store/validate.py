@@ -39,7 +39,10 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
         raise _problem(folder, "no folder", "a generated dataset, a sequence, or tracks", "check the path")
     if seal.is_sequence(folder) or is_run(folder):
         return list(_faults(folder))
-    every, tars = [*_inside(folder, seal.is_sequence), *_inside(folder, is_run)], sorted(folder.glob("**/*-s*.tar"))
+    every, tars = (
+        [*_inside(folder, seal.is_sequence), *_inside(folder, is_run)],
+        sorted(filter(packs.is_named_as_shard, folder.glob("**/*.tar"))),
+    )
     partial = sorted(folder.glob(f"**/{PARTIAL}*"))
     found = [_problem(path, "left by an interrupted run", "no such file or folder") for path in partial]
     if not every and not found and not tars:

@@ -91,6 +91,12 @@ def test_readers_take_shards_as_folders(tmp_path: Path, simulate: Any) -> None:
     assert json.loads(both[0])["annotations"] == json.loads(both[1])["annotations"]
 
 
+def test_coco_cannot_name_pictures_in_shards(tmp_path: Path, simulate: Any) -> None:
+    generate(entries()[:1], range(1), tmp_path / "set", pack=True)
+    with pytest.raises(InputError, match="pictures in a shard"):
+        coco(tmp_path / "set", tmp_path / "coco.json")
+
+
 def test_shards_are_kept_extended_and_made_anew(tmp_path: Path, simulate: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     def made(seeds: range, **more: Any) -> int:
         count = 0
