@@ -189,7 +189,7 @@ def stored_shard(job: ShardJob) -> tuple[set[int], dict[str, OrderError]] | None
     """
     if not packs.is_shard(job.path):
         return None
-    facts, wanted = packs.read_table(packs.seal_of(job.path)).facts, job.facts
+    facts, wanted = packs.read_seal(job.path).facts, job.facts
     if other := [key for key in wanted if facts.get(key) != wanted[key]]:
         got, expected = (", ".join(f"{k} {str(some.get(k))[:8]}" for k in other) for some in (facts, wanted))
         remedy = "choose another --out, or delete that shard"

@@ -62,7 +62,7 @@ def content_hash(folder: str | Path) -> str:
         raise _problem(Path(folder), "no sequences", "a generated sequence or dataset", "give what `generate` made")
     hashes = {split_and_name(p): seal.read_manifest(p)["content_hash"] for p in folders}
     for shard in shards:
-        split, rows = shard.absolute().parent.parent.name, packs.rows_of(packs.read_table(packs.seal_of(shard)))
+        split, rows = shard.absolute().parent.parent.name, packs.rows_of(packs.read_seal(shard))
         hashes |= {f"{split}/{row[0]}": row[-1] for row in rows}
     return hashing.dataset_hash(hashes)
 

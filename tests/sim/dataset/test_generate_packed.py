@@ -17,6 +17,7 @@ from scenarios.loading.resolve import Entry
 from sim.dataset import generate as dataset
 from sim.dataset.generate import generate
 from sim.store import packs
+from sim.store.tables import read_table
 from sim.store.validate import content_hash, validate
 from sim.workers.start import WorkerOptions
 from tests.fake_simulator import scenario
@@ -51,7 +52,7 @@ def test_shards_hold_the_folders_of_the_same_command(tmp_path: Path, simulate: A
     assert validate(tmp_path / "packed") == []
     assert content_hash(tmp_path / "packed") == content_hash(tmp_path / "plain")
     index, split = (
-        packs.read_table(tmp_path / "packed/flockscope-train/index.parquet"),
+        read_table(tmp_path / "packed/flockscope-train/index.parquet"),
         tmp_path / "plain/flockscope-train",
     )
     wanted = sorted(path.name for path in split.iterdir())
