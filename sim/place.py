@@ -30,10 +30,36 @@ class Stairs(Frozen):
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Box(Frozen):
+    """A box: middle at (3,) m, size (3,) m along its own axes. It is turned by turn_deg about the vertical, then leans
+    by tilt_deg over its own x axis, its top towards its own +y. colour (3,): red, green, blue, 0 to 255. pattern:
+    "grain", "plain", "stripes" or "checks", which repeat every `period` m. gloss: share of light mirrored, 0 to 1."""
+
+    at: Array
+    size: Array
+    turn_deg: float
+    tilt_deg: float
+    colour: Array
+    pattern: str
+    period: float
+    gloss: float
+
+    @classmethod
+    def of(cls, b: Any) -> Box:
+        """Returns the Box with the values of an object `b` that has attributes of the same names; its colour may be in
+        words."""
+        from scenarios.schema.colours import rgb
+
+        colour = np.array(rgb(b.colour) if isinstance(b.colour, str) else b.colour, float)
+        at, size = np.array(b.at, float), np.array(b.size, float)
+        return cls(at, size, b.turn_deg, b.tilt_deg, colour, b.pattern, b.period, b.gloss)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Scene(Frozen):
     """The static world, in m: size (2,) x, y, from the origin on; walls (W, 2, 2): segments [x1, y1], [x2, y2]; pillars
     (P, 3): x, y, radius; doors (D, 2, 2): segments, openings that `walls` leave free; service (S, 2): service points x,
-    y; stairs; wall_height, pillar_height. By default there are no walls, pillars, doors, service points and stairs."""
+    y; stairs; wall_height, pillar_height; boxes. By default there is nothing but the ground."""
 
     size: Array
     walls: Array = field(default_factory=lambda: np.zeros((0, 2, 2)))
@@ -43,6 +69,7 @@ class Scene(Frozen):
     stairs: tuple[Stairs, ...] = ()
     wall_height: float = 2.5
     pillar_height: float = 2.5
+    boxes: tuple[Box, ...] = ()
 
     @classmethod
     def of(cls, world: Any, walls: Any, doors: Any) -> Scene:
@@ -55,6 +82,7 @@ class Scene(Frozen):
             np.array(world.pillars, float).reshape(-1, 3), np.array(doors, float).reshape(-1, 2, 2),
             np.array(world.service, float).reshape(-1, 2),
             tuple(map(Stairs.of, world.stairs)), world.wall_height, world.pillar_height,
+            tuple(map(Box.of, world.boxes or ())),
         )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from sim.clock import check_stride, every_nth
 from sim.draws import drawn
 from sim.looks import with_looks
 from sim.rng import look_seed
+from sim.scene.boxes import check_nobody_in_boxes
 from sim.scene.camera import px_per_m_at_centre
 from sim.scene.camera_placement import place_camera
 from sim.streams import check_streams
@@ -90,6 +91,7 @@ def observe(
     if getattr(scenario, "draws", None):
         scenario = drawn(cast("Scenario", scenario), motion.seed, motion.repeat)
     check_stride(stride, motion.fps)
+    check_nobody_in_boxes(motion)
     motion = with_looks(motion, scenario.looks)
     camera = place_camera(scenario.camera, motion)
     wanted = frozenset(check_streams(streams, "png"))

@@ -18,6 +18,7 @@ from sim.arrays import Frozen
 from sim.arrays import Image as Image
 from sim.arrays import Ints as Ints
 from sim.arrays import no_ids as no_ids
+from sim.place import Box as Box
 from sim.place import Camera as Camera
 from sim.place import Looks as Looks
 from sim.place import Scene as Scene

@@ -1,10 +1,11 @@
-"""A slow, obvious renderer: every ray against every body, wall, pillar and step, by the formulas of a textbook."""
+"""A slow, obvious renderer: every ray against every body, wall, pillar, box and step, by the formulas of a textbook."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from sim.scene.body import ellipsoids, outline_boxes, outlines, recorded_bodies, recorded_things
 from sim.scene.terrain import height_at
@@ -54,7 +55,7 @@ def box(o: Array, d: Array, low: Array, high: Array) -> Array:
 
 
 def still(o: Array, d: Array, scene: Scene) -> tuple[Array, Bools]:
-    """First hit with ground, walls, pillars and stairs that rise, and whether it is a wall or pillar."""
+    """First hit with ground, walls, pillars, boxes and stairs that rise, and whether it is a wall, pillar or box."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ground = np.where(d[:, 2] < 0, -o[:, 2] / d[:, 2], NEVER)
     others, solids = [np.where(ground > 0, ground, NEVER)], [np.full(len(o), NEVER)]
@@ -67,6 +68,9 @@ def still(o: Array, d: Array, scene: Scene) -> tuple[Array, Bools]:
         solids.append(np.where((t > 0) & (s >= 0) & (s <= 1) & (z >= 0) & (z <= scene.wall_height), t, NEVER))
     for x, y, r in scene.pillars:
         solids.append(cylinder(o, d, np.array([x, y]), r, scene.pillar_height))
+    for b in scene.boxes:
+        turn = Rotation.from_euler("ZX", [b.turn_deg, -b.tilt_deg], degrees=True).as_matrix()  # its own axes as columns
+        solids.append(box((o - b.at) @ turn, d @ turn, -b.size / 2, b.size / 2))
     for stairs in scene.stairs:
         axis = (stairs.head - stairs.foot) / np.hypot(*(stairs.head - stairs.foot))
         length = float(np.hypot(*(stairs.head - stairs.foot)))

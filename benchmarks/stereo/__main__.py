@@ -1,9 +1,10 @@
-"""`stereo`: the paper's scenes and the tracker's decisions, crowds beside one eye.
+"""`stereo`: the paper's scenes and the tracker's decisions, crowds beside one eye; pairs for matchers.
 
     python -m benchmarks.stereo MODE [--seeds a:b] [--json FILE]
 
 scenes     the paper's scenes by its preset and the default: position errors, group scores; each decision switched off
 density    `stereo` in crowds of growing density, beside `group-pda` and `blob` on the left pictures
+matching   OpenCV's matchers on the suite `stereo-matching`, and the best single plane
 
 The docstrings of the files in this folder say what the columns mean.
 """
@@ -16,10 +17,12 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from benchmarks.stereo import density, scenes
+from benchmarks.stereo import density, matching, scenes
 from benchmarks.support.options import add_seeds, new_parser, one_thread, seeds_text
 
-MODES: dict[str, Callable[[argparse.Namespace], Any]] = {"scenes": scenes.scenes, "density": density.density}
+MODES: dict[str, Callable[[argparse.Namespace], Any]] = {
+    "scenes": scenes.scenes, "density": density.density, "matching": matching.matching,
+}  # fmt: skip
 
 
 def main() -> None:

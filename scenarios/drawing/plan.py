@@ -1,8 +1,8 @@
 """Draws a scenario as SVG, without simulating it: a plan, and beneath it the orders of the script in words.
 
-The plan shows ground, walls and pillars, ways, starts and orders, as far as they are known before the simulation. A
-distribution is replaced by its mean and the range of its draws. Where groups meet, and where a group divides, is taken
-to be half-way.
+The plan shows ground, walls, pillars and boxes, ways, starts and orders, as far as they are known before the
+simulation. A distribution is replaced by its mean and the range of its draws. Where groups meet, and where a group
+divides, is taken to be half-way.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ def _label(axes: Any, at: XY, words: str, colour: str, up: float, **style: Any) 
 
 
 def _draw_world(axes: Any, scenario: Scenario) -> None:
-    from matplotlib.patches import Circle
+    from matplotlib.patches import Circle, Rectangle
 
     world, (width, depth) = scenario.world, scenario.world.size
     step = 1.0 if width <= 40 else 5.0
@@ -138,6 +138,11 @@ def _draw_world(axes: Any, scenario: Scenario) -> None:
         axes.plot([x1, x2], [y1, y2], color="#24292f", lw=3.5, solid_capstyle="butt", clip_on=False)
     for x, y, radius in world.pillars:
         axes.add_patch(Circle((x, y), radius, color=GREY))
+    for box in world.boxes or ():
+        tilt, (x, y, _), (wide, deep, high) = math.radians(box.tilt_deg), box.at, box.size
+        deep = deep * math.cos(tilt) + high * abs(math.sin(tilt))  # a leaning box covers a rectangle
+        corner, turned = (x - wide / 2, y - deep / 2), dict[str, Any](angle=box.turn_deg, rotation_point="center")
+        axes.add_patch(Rectangle(corner, wide, deep, **turned, fc=PALE, ec=GREY))
     for at in world.service:
         axes.plot(*at, "s", mfc="white", mec="#24292f")
     for at, name in [*((door.at, "door") for door in world.doors), *((at, "service") for at in world.service)]:

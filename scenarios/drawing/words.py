@@ -44,8 +44,12 @@ def setting(scenario: Scenario) -> list[str]:
     """Returns three lines: duration and placement of the script, the world, the camera."""
     world, camera = scenario.world, scenario.camera
     things = {"wall": world.walls, "door": world.doors, "pillar": world.pillars, "flight of stairs": world.stairs}
-    things["service point"] = world.service
-    things_in_it = [f"{len(rows)} {name}{'s' * (len(rows) > 1)}" for name, rows in things.items() if rows]
+    things |= {"service point": world.service, "box": world.boxes or ()}
+    things_in_it = [
+        f"{len(rows)} {name}{('es' if name == 'box' else 's') * (len(rows) > 1)}"
+        for name, rows in things.items()
+        if rows
+    ]
     turned = [] if scenario.turn_deg == 0.0 else [f"turned by {number(scenario.turn_deg)}°"]
     turned += ["mirrored by a coin"] * scenario.mirror
     turned += [] if scenario.lead == 0.0 else [f"{number(scenario.lead, 's')} further on than it says"]

@@ -29,8 +29,9 @@ def _colour(word: str) -> str:
     return word
 
 
+Colour = Annotated[str, AfterValidator(_colour)]
 Colours = Annotated[
-    tuple[Annotated[str, AfterValidator(_colour)], ...],
+    tuple[Colour, ...],
     Field(min_length=1),
     BeforeValidator(lambda value: (value,) if isinstance(value, str) else value),
 ]

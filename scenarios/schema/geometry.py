@@ -8,8 +8,9 @@ from __future__ import annotations
 import math
 from functools import partial
 
-from scenarios.schema.scenario import DoorSpec, QueueOrder, WorldSpec
+from scenarios.schema.scenario import QueueOrder
 from scenarios.schema.values import FixedPoint
+from scenarios.schema.world import DoorSpec, WorldSpec
 
 WallSegment = tuple[float, float, float, float]
 DOOR_TOLERANCE = 0.05  # m

@@ -20,11 +20,12 @@ from scenarios.schema.sensor import Sensor
 # isort: off
 # fmt: off
 from scenarios.schema.values import (
-    Distribution, FixedPoint, Model, Name, NonNegative, Pattern, Point, Positive, Side, Value, bounds, problem,
+    Distribution, FixedPoint, Model, Name, Pattern, Point, Positive, Side, Value, bounds, problem,
     within,
 )
 # fmt: on
 # isort: on
+from scenarios.schema.world import WorldSpec
 
 FASTEST = 10.0  # m/s: as fast as a sprinter
 Speed = Annotated[Value, within(0.05, FASTEST, " m/s")]
@@ -33,66 +34,7 @@ Noise = Annotated[float, within(0.0, 1.0, " m/s")]
 Height = Annotated[Value, within(0.3, 3.0, " m")]
 Stray = Annotated[float, within(0.0, 2.0, " m")]
 Factor = Annotated[float, within(0.0, 10.0)]
-Length = Annotated[float, within(0.1, 10_000.0, " m")]
 AtGoal = Literal["stand", "leave", "walk"]
-
-
-class DoorSpec(Model):
-    """A door: an opening in a wall.
-
-    Attributes:
-        at: middle of the opening, m; must lie on a wall
-        width: m
-    """
-
-    at: FixedPoint
-    width: Positive = 1.2
-
-
-class StairsSpec(Model):
-    """A flight of stairs; its height rises from 0 at `foot` to `rise` at `head`.
-
-    Attributes:
-        foot: middle of the lowest edge, m
-        head: middle of the highest edge, m
-        width: width across, m
-        rise: height of the head above the foot, m
-        steps: number of steps
-        landing: length of the level ground behind the head, m
-        slowdown: share of the walking speed kept on the stairs
-    """
-
-    foot: FixedPoint
-    head: FixedPoint
-    width: Positive = 3.0
-    rise: float = 1.5
-    steps: Annotated[int, Field(ge=1)] = 10
-    landing: NonNegative = 4.0
-    slowdown: Annotated[float, Field(gt=0, le=1)] = 0.6
-
-
-class WorldSpec(Model):
-    """The immobile parts of the scene; by default an empty world.
-
-    Attributes:
-        size: extent in x and y, m
-        walls: each wall: x1, y1, x2, y2 of its ends, m
-        pillars: each pillar: x, y of its middle and radius, m
-        stairs: flights of stairs
-        doors: openings in walls
-        service: service points (counters), m
-        wall_height: height of the walls, m
-        pillar_height: height of the pillars, m
-    """
-
-    size: tuple[Length, Length] = (16.0, 10.0)
-    walls: tuple[tuple[float, float, float, float], ...] = ()
-    pillars: tuple[tuple[float, float, Positive], ...] = ()
-    stairs: tuple[StairsSpec, ...] = ()
-    doors: tuple[DoorSpec, ...] = ()
-    service: tuple[FixedPoint, ...] = ()
-    wall_height: Positive = 2.5
-    pillar_height: Positive = 2.5
 
 
 FREE_SPEED = Distribution(normal=(1.34, 0.26), clip=(0.5, 2.2))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from scenarios.schema.geometry import cut_walls
-from scenarios.schema.scenario import WorldSpec
+from scenarios.schema.world import WorldSpec
 from sim.elementary import dot, length
 from sim.geometry.walls import blocked, wall_distances
 from sim.types import Array, Ints, Scene

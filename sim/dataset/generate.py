@@ -6,18 +6,19 @@ The stored bytes depend on scenario, seed and versions only, not on the workers.
 
 from __future__ import annotations
 
+import shutil
 import socket
 import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, replace
-from itertools import product
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass, field, replace
+from itertools import groupby, product
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 from uuid import uuid4
 
-from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, counted
+from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, counted, reject
 from scenarios.loading.resolve import Entry, resolve
 from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import ObservationSpec
@@ -25,7 +26,7 @@ from sim.clock import check_stride
 from sim.dataset.replay import WHOLE, Cut, replay_name, resolve_replay
 from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
 from sim.draws import drawn
-from sim.store import sequence_folder
+from sim.store import packs, sequence_folder
 from sim.store.atomic import PARTIAL, lock_folder, remove_partials, write_file
 from sim.store.group_files import read_immobile, read_never_arrives
 from sim.store.own_files import is_side_file, output_path, output_paths
@@ -34,6 +35,7 @@ from sim.streams import check_streams
 from sim.types import Camera, Sequence
 from sim.workers.start import WorkerOptions, start_workers
 
+SPLIT = "flockscope-"  # begins the name of a split's folder
 SHARED_DELAY = 5.0  # s that a shared file system may take to show one machine the file of another
 
 
@@ -59,11 +61,43 @@ class SequenceJob:
 
 
 @dataclass(frozen=True)
+class ShardJob:
+    """One shard to make: sequences of one entry."""
+
+    path: Path  # of the shard: OUT/flockscope-<split>/<entry>/<entry>-s<first seed of its hundred>.tar
+    entry: Entry  # the scenario to simulate, not drawn yet
+    seeds: tuple[int, ...]  # all within one hundred
+    streams: tuple[str, ...] = ()  # as of SequenceJob, and so are the others
+    images: str = "jpg"
+    stride: int = 1
+    marker: Path | None = None
+
+    @property
+    def name(self) -> str:
+        """The name of the shard, without `.tar`."""
+        return self.path.stem
+
+    @property
+    def facts(self) -> dict[str, Any]:
+        """What is equal for all seeds: the identity of the entry's scenario, and what is stored of it."""
+        same = identity(dump(self.entry.scenario), 0, self.entry.repeat, self.streams, self.images)
+        return {key: value for key, value in same.items() if key != "seed"} | {"stride": self.stride}
+
+    def job(self, folder: Path, seed: int) -> SequenceJob:
+        """Returns the job that stores the sequence of one seed in `folder`."""
+        entry = replace(self.entry, scenario=drawn(self.entry.scenario, seed, self.entry.repeat))
+        path = output_path(folder, entry.name, f"-s{seed:05d}")
+        return SequenceJob(path, entry, seed, self.streams, self.images, self.stride)
+
+
+@dataclass(frozen=True)
 class JobOutcome:
     """How a job ended."""
 
-    error: FlockscopeError | None = None  # the error, None if the sequence is stored
+    error: FlockscopeError | None = None  # the error, None if the sequence or shard is stored
     fatal: bool = False  # True if every other job would fail in the same way, as with a full disk
+    # the error of each sequence that is not in the shard because an order of its script did not come true, by name
+    left_out: Mapping[str, OrderError] = field(default_factory=dict)
 
 
 def stored_manifest(job: SequenceJob) -> dict[str, Any] | None:
@@ -148,7 +182,54 @@ def run_job(job: SequenceJob) -> JobOutcome:
     return JobOutcome()
 
 
-def lost_job(job: SequenceJob, error: WorkError) -> JobOutcome:
+def stored_shard(job: ShardJob) -> tuple[set[int], dict[str, OrderError]] | None:
+    """Returns the seeds that a stored shard has, and its sequences that were left out; None without a sealed shard.
+
+    Raises InputError if the shard is of another scenario, version or pictures.
+    """
+    if not packs.is_shard(job.path):
+        return None
+    facts, wanted = packs.read_seal(job.path).facts, job.facts
+    if other := [key for key in wanted if facts.get(key) != wanted[key]]:
+        got, expected = (", ".join(f"{k} {str(some.get(k))[:8]}" for k in other) for some in (facts, wanted))
+        remedy = "choose another --out, or delete that shard"
+        raise InputError(file=job.path, got=f"sequences of {got}", expected=expected, remedy=remedy)
+    return set(facts["seeds"]), {name: OrderError(**parts) for name, parts in facts["left_out"].items()}
+
+
+def run_shard(job: ShardJob) -> JobOutcome:
+    """Makes a shard unless it is stored undamaged with all seeds of the job; stored seeds of its hundred stay in it.
+
+    A FlockscopeError is in the outcome, not raised; a shard with another error than an OrderError is not written.
+    """
+    left_out: dict[str, OrderError] = {}
+    try:
+        if job.marker is not None:
+            _wait_for(job.marker)
+        stored = stored_shard(job)
+        if stored is not None and stored[0].issuperset(job.seeds):
+            with suppress(InputError):  # damaged: it is made anew
+                packs.check_shard(job.path)
+                return JobOutcome(left_out=stored[1])
+        seeds = sorted({*job.seeds, *(stored[0] if stored else ())})
+        facts = {**job.facts, "seeds": seeds, "left_out": {}}
+        with packs.new_shard(job.path, job.path.parents[1].name.removeprefix(SPLIT), facts) as (shard, folder):
+            for one in (job.job(folder, seed) for seed in seeds):
+                try:
+                    simulate_and_store(one)
+                except OrderError as error:
+                    left_out[one.name] = error
+                    facts["left_out"][one.name] = error.as_dict()
+                    continue
+                shard.add(one.folder)
+                shutil.rmtree(one.folder)
+    except FlockscopeError as error:
+        fatal = isinstance(error.__cause__, OSError)
+        return JobOutcome(error, fatal)
+    return JobOutcome(left_out=left_out)
+
+
+def lost_job(job: SequenceJob | ShardJob, error: WorkError) -> JobOutcome:
     """Returns the outcome of a job that killed too many workers: `error` with the job's name as its file."""
     return JobOutcome(error.replaced(file=job.name))
 
@@ -167,6 +248,7 @@ def _wait_for(marker: Path) -> None:
 LEFT_OUT = 0.05  # greatest share of sequences that may be left out because an order of their script did not come true
 QUEUED_JOBS = 100  # jobs that wait at a cluster's scheduler, beside one for each worker
 ONE_WORKER = WorkerOptions()
+J = TypeVar("J", SequenceJob, ShardJob)
 Progress = Callable[[int, int, str], None]  # called as progress(sequences done, sequences in all, name of the last one)
 
 
@@ -184,7 +266,7 @@ class Folders(list[Path]):
 def generate(
     entries: Iterable[Entry | str], seeds: range, out: str | Path, *, set: Iterable[str] = (),
     workers: WorkerOptions = ONE_WORKER, progress: Progress | None = None, streams: Iterable[str] = ("left",),
-    images: str = "jpg", background: bool = True, stride: int = 1,
+    images: str = "jpg", background: bool = True, stride: int = 1, pack: bool = False,
 ) -> Folders:  # fmt: skip
     """Simulates every entry with every seed, and stores each sequence as OUT/flockscope-<split>/<name>-s<seed>/.
 
@@ -202,43 +284,78 @@ def generate(
         images: Their file type, "jpg", "png" or "mp4".
         background: True adds "background" to "left" and "right".
         stride: N stores every N-th frame of the camera only: 1, 1 + N, …, numbered from 1.
+        pack: True stores shards in place of folders, of up to 100 sequences each (`sim.store.packs`). A shard is
+            made whole or not at all.
 
     Returns:
-        The folders, in the order of entries, all seeds of an entry together. `left_out` has the errors of sequences
-        left out because an order of their script did not come true.
+        The folders, or the shards, in the order of entries, all seeds of an entry together. `left_out` has the errors
+        of sequences left out because an order of their script did not come true.
 
     Raises:
         InputError: An argument is wrong, a folder holds another sequence, or all failures are InputErrors.
         WorkError: Sequences failed, more than 5 % were left out, or workers were lost. The other sequences are made.
     """
     split, root = split_of(seeds), Path(out) if workers.cluster is None else Path(out).absolute()
-    folder = root / f"flockscope-{split}"
+    folder = root / f"{SPLIT}{split}"
     settings, wanted = tuple(set), check_streams(streams, images, background)
     found = [e for entry in entries for e in (resolve(entry, settings) if isinstance(entry, str) else [entry])]
     try:
         output_paths(folder, [entry.name for entry in found], source="entries")
     except InputError as error:
         raise error.replaced(remedy='combine them in a suite: entry = [{ suite = "NAME" }, …], see the docs') from None
+    if pack:
+        return _generate_shards(found, seeds, root, folder, (wanted, images, stride), workers, progress)
     jobs = []
     for entry, seed in product(found, seeds):
         one = replace(entry, scenario=drawn(entry.scenario, seed, entry.repeat))
         check_stride(stride, one.scenario.camera.fps)
         jobs.append(SequenceJob(output_path(folder, one.name, f"-s{seed:05d}"), one, seed, wanted, images, stride))
     with _dataset(root, folder):
+        packed = next(folder.glob("*/*-s[0-9]*.tar"), None)
+        reject(packed is not None, folder, "a packed dataset", "one of folders", "add --pack, or choose another --out")
         for job in jobs:
             stored_manifest(job)
-        errors = _run_jobs(jobs, workers, progress)
+        errors = _run_jobs(jobs, workers, progress, root, run_job)
         try:
             write_seqmap(root, split)
         except FlockscopeError as error:
             errors["seqmaps"] = error
-    unfulfilled = {name: error for name, error in errors.items() if isinstance(error, OrderError)}
-    if len(errors) > len(unfulfilled) or len(unfulfilled) > LEFT_OUT * len(jobs):
-        many = len(unfulfilled) > LEFT_OUT * len(jobs)
-        raise _summary({name: e for name, e in errors.items() if many or name not in unfulfilled}, len(jobs))
+    unfulfilled = _left_out(errors, len(jobs))
     made = Folders((job.folder for job in jobs if job.name not in unfulfilled), unfulfilled)
     _warn_of_who_stands(made)
     return made
+
+
+def _left_out(errors: dict[str, FlockscopeError], total: int) -> dict[str, OrderError]:
+    """Returns the OrderErrors if they are all there is, and few enough; else raises the summary of the errors."""
+    unfulfilled = {name: error for name, error in errors.items() if isinstance(error, OrderError)}
+    many = len(unfulfilled) > LEFT_OUT * total
+    if len(errors) > len(unfulfilled) or many:
+        raise _summary({name: e for name, e in errors.items() if many or name not in unfulfilled}, total)
+    return unfulfilled
+
+
+def _generate_shards(
+    entries: list[Entry], seeds: range, root: Path, folder: Path, stored: tuple[tuple[str, ...], str, int],
+    workers: WorkerOptions, progress: Progress | None,
+) -> Folders:  # fmt: skip
+    """Does what `generate` does, with shards. stored: streams, file type and stride."""
+    hundreds = [(first, tuple(some)) for first, some in groupby(seeds, lambda seed: seed - seed % packs.SEEDS)]
+    jobs = []
+    for entry, (first, some) in product(entries, hundreds):
+        path = output_path(output_path(folder, entry.name), entry.name, f"-s{first:05d}.tar")
+        jobs.append(ShardJob(path, entry, some, *stored))
+    with _dataset(root, folder):
+        other = next(folder.glob(f"*/{MANIFEST}"), None)
+        reject(other is not None, folder, "sequences in folders", "a packed dataset", "choose another --out")
+        remove_partials(*(job.path.parent for job in jobs))
+        for job in jobs:
+            check_stride(stored[2], job.job(folder, job.seeds[0]).entry.scenario.camera.fps)
+            stored_shard(job)
+        errors = _run_jobs(jobs, workers, progress, root, run_shard)
+        if packs.shards_in(folder):
+            packs.write_index(folder)
+    return Folders((job.path for job in jobs), _left_out(errors, len(entries) * len(seeds)))
 
 
 def _warn_of_who_stands(folders: Iterable[Path]) -> None:
@@ -262,22 +379,23 @@ def _dataset(root: Path, folder: Path) -> Iterator[None]:
             remove_partials(root, folder)
 
 
-def _run_jobs(jobs: list[SequenceJob], workers: WorkerOptions, progress: Progress | None) -> dict[str, FlockscopeError]:
-    errors: dict[str, FlockscopeError] = {}
+def _run_jobs(
+    jobs: list[J], workers: WorkerOptions, progress: Progress | None, root: Path, function: Callable[[J], JobOutcome]
+) -> dict[str, FlockscopeError]:
+    errors: dict[str, dict[str, FlockscopeError]] = {}
     with start_workers(min(workers.count, max(1, len(jobs))), workers.cluster) as run:
         if jobs and workers.cluster is not None:
-            marker = jobs[0].folder.parents[1] / f"{PARTIAL}{uuid4().hex}"
+            marker = root / f"{PARTIAL}{uuid4().hex}"
             write_file(marker, b"")
             jobs = [replace(job, marker=marker) for job in jobs]
-        done = run(run_job, jobs, ahead=QUEUED_JOBS, on_loss=lost_job)
+        done = run(function, jobs, ahead=QUEUED_JOBS, on_loss=lost_job)
         for count, (job, outcome) in enumerate(done, 1):
-            if outcome.error is not None:
-                errors[job.name] = outcome.error
+            errors[job.name] = {**outcome.left_out, **({} if outcome.error is None else {job.name: outcome.error})}
             if outcome.fatal:
                 break
             if progress is not None:
                 progress(count, len(jobs), job.name)
-    return {job.name: errors[job.name] for job in jobs if job.name in errors}
+    return {name: error for job in jobs for name, error in errors.get(job.name, {}).items()}
 
 
 def write_seqmap(root: Path, split: str) -> None:

@@ -31,7 +31,7 @@ from sim.render.canvas import MOST, TILE_H, TILE_W, UNIT, FrameCanvas
 from sim.render.materials import Style
 from sim.render.weather import Foliage, Illumination
 from sim.rng import rng
-from sim.scene.raycast import GROUND, NOTHING, PILLAR, WALL, PixelRays, Solids, pixel_rays, signed_scale, solids_of
+from sim.scene.raycast import BOX, GROUND, NOTHING, PILLAR, WALL, PixelRays, Solids, pixel_rays, signed_scale, solids_of
 from sim.types import Array, Camera, Ints, Motion
 
 if TYPE_CHECKING:
@@ -46,7 +46,9 @@ class PixelGeometry:
     """What each pixel's centre shows of the empty scene."""
 
     depth: Floats  # (H, W) float32: m along the optical axis; inf for sky
-    kind: NDArray[np.uint8]  # (H, W) uint8: NOTHING (sky), GROUND, WALL, PILLAR, TREAD or RISER of `sim.scene.raycast`
+    kind: NDArray[
+        np.uint8
+    ]  # (H, W) uint8: NOTHING (sky), GROUND, WALL, PILLAR, TREAD, RISER or BOX of `sim.scene.raycast`
     place: Floats  # (3, H, W) float32: x, y, z in m in the world; 1e9 for sky
 
 
@@ -107,7 +109,7 @@ def noise_offsets(rows: int, seed: int, repeat: int, side: int, frame: int) -> I
 
 
 NODE_STEP = 16  # px between the nodes at which clouds and wind are computed; they are linear between
-OCCLUDER = -2  # id of walls, pillars and things in id maps
+OCCLUDER = -2  # id of walls, pillars, boxes and things in id maps
 
 
 class CameraView:
@@ -187,11 +189,11 @@ class CameraView:
 
     @cached_property
     def _occluders(self) -> NDArray[np.int64] | None:
-        solid = (self.geometry.kind == WALL) | (self.geometry.kind == PILLAR)
+        solid = np.isin(self.geometry.kind, (WALL, PILLAR, BOX))
         return np.where(solid, OCCLUDER, 0).astype(np.int64) if solid.any() else None
 
     def empty_ids(self) -> NDArray[np.int64]:
-        """Returns a new id map (H, W) of the empty scene: OCCLUDER where a wall or pillar shows, else 0."""
+        """Returns a new id map (H, W) of the empty scene: OCCLUDER where a wall, pillar or box shows, else 0."""
         # Zeros are quicker than a copy of zeros.
         return np.zeros((self.height, self.width), np.int64) if self._occluders is None else self._occluders.copy()
 

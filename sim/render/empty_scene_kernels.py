@@ -19,17 +19,21 @@ from sim.render.texture_kernels import (
     stain, value_noise,
 )
 from sim.scene.raycast import (
-    GROUND, HIT_INDEX, HIT_KIND, HIT_PLACE, HIT_SLOTS, NORMAL_X, NOTHING, PILLAR, RISER, TREAD, WALL,
+    BOX, GROUND, HIT_INDEX, HIT_KIND, HIT_PLACE, HIT_SLOTS, NORMAL_X, NOTHING, PILLAR, RISER, TREAD, WALL,
 )
 # fmt: on
 # isort: on
+from sim.scene.boxes import AXES, COLOUR, GLOSS, HALF, MIDDLE, PATTERN, PATTERNS, PERIOD
 from sim.scene.raycast_kernels import first_hit, has_solids, look
 
 PANELS, WINDOWS, HOUSES = WALLS.index("panels"), WALLS.index("windows"), BACKDROPS.index("houses")
 KERB = 0.1  # m: borders less ragged have kerbstones
 PAINT = 225.0  # grey level of painted lines at full light
 SKY_DISTANCE = 200.0  # m: what fog hides of the sky
-POINT, NORMAL, SPARE, BLOCKED = range(4)  # rows of the scratch `more`
+POINT, NORMAL, SPARE, BLOCKED, MIRRORED, REFLECTION = range(6)  # rows of the scratch `more`
+PLAIN, STRIPES = PATTERNS.index("plain"), PATTERNS.index("stripes")
+BOX_KEY = 200  # of the grain of boxes, which is another on each
+SUN_LEVEL = 1500.0  # grey levels of the sun's image in a glossy side, before it is clipped
 
 
 @njit(cache=True)
@@ -104,6 +108,32 @@ def _upright(kind, along, z, footprint, style, palette, key, out):  # type: igno
         row = STONE if kind == PILLAR else STEP
         edge = -0.18 if kind == RISER else 0.0
         _tint(palette[row], contrast * (0.4 if style.walls == 0 else 0.15) * fine + edge, 0.0, out)
+
+
+@njit(cache=True)
+def _square_wave(x, period, footprint):  # type: ignore[no-untyped-def]
+    """Returns a square wave at x m, from -1 to 1, whose edges are as wide as a pixel."""
+    phase = x / period - np.floor(x / period)
+    return min(max((1.0 - 4.0 * abs(phase - 0.5)) * 0.5 * period / footprint, -1.0), 1.0)
+
+
+@njit(cache=True)
+def _box_side(point, side, box, footprint, contrast, key, out):  # type: ignore[no-untyped-def]
+    """Sets out (3,) to the colour of a box (22,) at a point (3,) m of the side perpendicular to its axis `side`."""
+    place = (1 if side == 0 else 0), (1 if side == 2 else 2)
+    x = y = 0.0
+    for k in range(3):
+        x += (point[k] - box[MIDDLE + k]) * box[AXES + 3 * place[0] + k]
+        y += (point[k] - box[MIDDLE + k]) * box[AXES + 3 * place[1] + k]
+    x, y = x + box[HALF + place[0]], y + box[HALF + place[1]]
+    pattern, period, value = int(box[PATTERN]), box[PERIOD], 0.0
+    if pattern == 0:
+        value = 0.5 * grain(x, y, key, footprint, 0.4)
+    elif pattern != PLAIN:
+        value = _square_wave(x, period, footprint) * (0.6 * contrast_kept(period, footprint))
+        if pattern != STRIPES:
+            value *= _square_wave(y, period, footprint)
+    _tint(box[COLOUR : COLOUR + 3], contrast * value, 0.0, out)
 
 
 @njit(cache=True)
@@ -188,13 +218,62 @@ def trace_pixels(rays, solids, style, depth, kind, place):  # type: ignore[no-un
 
 
 @njit(cache=True)
+def _surface(hit, point, solids, size, footprint, slope, style, palette, out):  # type: ignore[no-untyped-def]
+    """Sets out (3,) to the unlit colour of a hit at a point (3,) m; returns (is it grass, share of plants)."""
+    kind, index, key = int(hit[HIT_KIND]), int(hit[HIT_INDEX]), style.key
+    if kind == GROUND:
+        return _ground(point[0], point[1], size, footprint, slope, style, palette, out)
+    if kind == BOX:
+        own = key + BOX_KEY + 16 * index
+        _box_side(point, int(hit[HIT_PLACE]), solids.boxes[index], footprint, style.contrast, own, out)
+    elif kind == TREAD:
+        _upright(kind, point[0], point[1], footprint, style, palette, key + 7 * index, out)
+    else:
+        _upright(kind, hit[HIT_PLACE], point[2], footprint, style, palette, key + 7 * index + 1, out)
+    return False, 0.0
+
+
+@njit(cache=True)
+def _mirror(d, scale, distance, sun, shadow, solids, size, style, palette, more):  # type: ignore[no-untyped-def]
+    """Sets more[REFLECTION] to the colour that a side at more[POINT], more[NORMAL] mirrors, seen along d (3,).
+
+    distance: from the camera, m. It mirrors the empty scene without cast shadows and further mirrors, and the sun where
+    it shows the sky.
+    """
+    point, normal, start, hit = more[POINT], more[NORMAL], more[SPARE], more[BLOCKED]
+    r, out = more[MIRRORED], more[REFLECTION]
+    along = d[0] * normal[0] + d[1] * normal[1] + d[2] * normal[2]
+    for k in range(3):
+        r[k] = d[k] - 2.0 * along * normal[k]
+        start[k] = point[k] + 1e-4 * normal[k]
+    t = first_hit(start, r, solids, hit)
+    if int(hit[HIT_KIND]) == NOTHING:
+        _sky(r, style.key, palette, out)
+        length = np.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2])
+        lobe = max(r[0] * sun[0] + r[1] * sun[1] + r[2] * sun[2], 0.0) / length
+        for _ in range(9):  # the 512th power: half as bright 3 degrees beside the sun's image
+            lobe *= lobe
+        for k in range(3):
+            out[k] += SUN_LEVEL * shadow * lobe
+        return
+    for k in range(3):
+        start[k] += t * r[k]
+    footprint = (distance + t if scale > 0 else 1.0) / abs(scale)
+    _surface(hit, start, solids, size, footprint, 1.0, style, palette, out)
+    facing = max(0.0, hit[NORMAL_X] * sun[0] + hit[NORMAL_X + 1] * sun[1] + hit[NORMAL_X + 2] * sun[2])
+    light = (1 - shadow) * (0.85 + 0.15 * hit[NORMAL_X + 2]) + shadow * facing / max(sun[2], 0.3)
+    for k in range(3):
+        out[k] *= light
+
+
+@njit(cache=True)
 def _point_colour(  # type: ignore[no-untyped-def]
     x, y, rays, scale, sun, shadow, penumbra, solids, size, style, palette, o, d, hit, more, out
 ):
     """Sets out (3,) to the colour seen through the image point (x, y) px, shaded by solid things and hazy.
 
     Returns the share of direct sun in its light, the share covered by plants, and a whole number that is equal for
-    points of one surface lit alike. Arguments as of `paint_pixels`; o, d (3,), hit (6,), more (4, 6): scratch.
+    points of one surface lit alike. Arguments as of `paint_pixels`; o, d (3,), hit (6,), more (6, 6): scratch.
     """
     t = look(rays, x, y, solids, o, d, hit)
     kind, key = int(hit[HIT_KIND]), style.key
@@ -216,24 +295,28 @@ def _point_colour(  # type: ignore[no-untyped-def]
     # There is no haze from above.
     distance = t if scale > 0 else 1.0
     footprint = distance / abs(scale) / np.sqrt(max(slope, 0.02))
-    index, grass, plants = int(hit[HIT_INDEX]), False, 0.0
-    if kind == GROUND:
-        grass, plants = _ground(point[0], point[1], size, footprint, slope, style, palette, out)
-    elif kind == TREAD:
-        _upright(kind, point[0], point[1], footprint, style, palette, key + 7 * index, out)
-    else:
-        _upright(kind, hit[HIT_PLACE], point[2], footprint, style, palette, key + 7 * index + 1, out)
+    index = int(hit[HIT_INDEX])
+    grass, plants = _surface(hit, point, solids, size, footprint, slope, style, palette, out)
     facing = max(0.0, normal[0] * sun[0] + normal[1] * sun[1] + normal[2] * sun[2]) / max(sun[2], 0.3)
     lit = _sunlit(point, normal, sun, penumbra, solids, spare, blocked) if shadow > 0 and facing > 0 else 0.0
     sunlight = shadow * facing * lit
     light = (1 - shadow) * (0.85 + 0.15 * normal[2]) + sunlight
     haze = 1 - np.exp(-max(distance - 25.0, 0.0) / 120.0 - style.fog * distance)
-    lamps, dark = lamp_light(point[0], point[1], style), night(style)
+    lamps, dark, mirrored = lamp_light(point[0], point[1], style), night(style), 0.0
+    if kind == BOX and solids.boxes[index, GLOSS] > 0.0:
+        mirrored = solids.boxes[index, GLOSS]
+        mirrored += (1.0 - mirrored) * (1.0 - slope) ** 5
+        _mirror(d, scale, distance, sun, shadow, solids, size, style, palette, more)
     for k in range(3):
-        out[k] = out[k] * light * lamps * (1 - haze) + palette[SKY, k] * dark * haze
+        shown = out[k] * light * lamps
+        if mirrored > 0.0:
+            shown += mirrored * (more[REFLECTION, k] * dark - shown)
+        out[k] = shown * (1 - haze) + palette[SKY, k] * dark * haze
     level = int(np.rint(1000 * point[2])) if kind == TREAD else int(2 * normal[0]) + 7 * int(2 * normal[1])
+    if kind == BOX:
+        level = int(hit[HIT_PLACE])
     surface = ((level * 64 + index) * 5 + int(4 * lit)) * 16 + 2 * kind + (1 if grass else 0)
-    return sunlight * (1 - haze) / light, plants, surface
+    return sunlight * (1 - haze) / light * (1.0 - mirrored), plants, surface
 
 
 @njit(cache=True)
@@ -247,7 +330,7 @@ def paint_pixels(  # type: ignore[no-untyped-def]
     of the world. style: Style. palette (6, 3): rows GREY ….
     """
     height, width = direct.shape
-    o, d, hit, more, c = np.empty(3), np.empty(3), np.empty(HIT_SLOTS), np.empty((4, HIT_SLOTS)), np.empty(3)
+    o, d, hit, more, c = np.empty(3), np.empty(3), np.empty(HIT_SLOTS), np.empty((6, HIT_SLOTS)), np.empty(3)
     surface = np.empty((height, width), np.int64)
     for turn in range(2 if samples == 1 else 1):
         many = 2 if turn else samples

@@ -61,6 +61,7 @@ def set_people(rows, depth, ids, seen, scale, right_depth, rays, solids, out):  
     """
     width, bounds, id = depth.shape[1], seen.outlines.bounds, seen.id
     o, d, hit, solid = np.empty(3), np.empty(3), np.empty(HIT_SLOTS), has_solids(solids)
+    thin = len(solids.boxes) > 0  # a box may lie between the middles of pixels
     for i in rows:
         for v in range(bounds[i, FIRST_ROW], bounds[i, END_ROW]):
             for u in range(bounds[i, FIRST_COLUMN], bounds[i, END_COLUMN]):
@@ -70,7 +71,12 @@ def set_people(rows, depth, ids, seen, scale, right_depth, rays, solids, out):  
                     near = min(right_depth[v, max(j - 1, 0)], right_depth[v, j], right_depth[v, min(j + 1, width - 1)])
                     x = u + 0.5 - scale / z
                     out[v, u] = scale / z if x >= 0.0 else np.nan
-                    if solid and near < z and x >= 0.0 and look(rays, x, v + 0.5, solids, o, d, hit) < z - SAME:
+                    if (
+                        solid
+                        and (thin or near < z)
+                        and x >= 0.0
+                        and look(rays, x, v + 0.5, solids, o, d, hit) < z - SAME
+                    ):
                         out[v, u] = np.nan
 
 

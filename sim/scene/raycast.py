@@ -1,7 +1,8 @@
 """Inputs of the compiled ray casting, in m: the solid things of a scene, and the lines of sight of a camera.
 
-`Solids` holds walls, pillars and stairs. `PixelRays` holds two 3 x 3 matrices that give the line of sight of each image
-point (u, v) px. `sim.scene.raycast_kernels.first_hit` finds what a ray meets first among `Solids` and the ground.
+`Solids` holds walls, pillars, stairs and boxes. `PixelRays` holds two 3 x 3 matrices that give the line of sight of
+each image point (u, v) px. `sim.scene.raycast_kernels.first_hit` finds what a ray meets first among `Solids` and the
+ground.
 """
 
 from __future__ import annotations
@@ -11,10 +12,11 @@ from typing import NamedTuple
 import numpy as np
 
 from sim.elementary import dot, product
+from sim.scene.boxes import box_rows
 from sim.scene.terrain import flight_rows
 from sim.types import Array, Camera, Scene
 
-NOTHING, GROUND, WALL, PILLAR, TREAD, RISER = range(6)  # what a ray meets: the hit's HIT_KIND
+NOTHING, GROUND, WALL, PILLAR, TREAD, RISER, BOX = range(7)  # what a ray meets: the hit's HIT_KIND
 HIT_KIND, NORMAL_X, NORMAL_Y, NORMAL_Z, HIT_INDEX, HIT_PLACE = range(6)  # slots of `hit`
 HIT_SLOTS = 6
 X1, Y1, X2, Y2 = range(4)  # columns of Solids.walls
@@ -25,6 +27,7 @@ class Solids(NamedTuple):
     """The solid things of a scene for the kernels, in m.
 
     walls (W, 4): x1, y1, x2, y2. pillars (P, 3): x, y, radius. flights (S, 9): stairs, as `terrain.flight_rows`.
+    boxes (B, 22): as `boxes.box_rows`.
     """
 
     walls: Array
@@ -32,6 +35,7 @@ class Solids(NamedTuple):
     pillars: Array
     pillar_height: float
     flights: Array
+    boxes: Array
 
 
 class PixelRays(NamedTuple):
@@ -45,15 +49,17 @@ class PixelRays(NamedTuple):
 
 
 def solids_of(scene: Scene) -> Solids:
-    """Returns the walls, pillars and stairs of a scene for the kernels."""
+    """Returns the solid things of a scene for the kernels."""
     walls = np.array(scene.walls, dtype=float).reshape(-1, 4)
     pillars = np.array(scene.pillars, dtype=float)
-    return Solids(walls, float(scene.wall_height), pillars, float(scene.pillar_height), flight_rows(scene))
+    return Solids(
+        walls, float(scene.wall_height), pillars, float(scene.pillar_height), flight_rows(scene), box_rows(scene)
+    )
 
 
-def only_flights(flights: Array) -> Solids:
-    """Returns the Solids that consist of these flights of stairs (S, 9), without walls and pillars."""
-    return Solids(np.zeros((0, 4)), 0.0, np.zeros((0, 3)), 0.0, flights)
+def stairs_and_boxes(solids: Solids) -> Solids:
+    """Returns the stairs and boxes alone, without walls and pillars."""
+    return solids._replace(walls=np.zeros((0, 4)), pillars=np.zeros((0, 3)))
 
 
 def unprojection(camera: Camera) -> Array:

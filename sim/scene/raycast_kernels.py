@@ -1,4 +1,4 @@
-"""Compiled ray casting: the first thing that a ray meets among the ground, walls, pillars and stairs.
+"""Compiled ray casting: the first thing that a ray meets among the ground, walls, pillars, stairs and boxes.
 
 A ray is o + t d: origin o, direction d, t above 0. t counts lengths of d; for rays of a PixelRays it is the depth, m.
 Stairs are drawn as steps: tread k of n lies at z = k rise/n, from (k - 1/2)/n to (k + 1/2)/n of the way; the last tread
@@ -12,12 +12,13 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.elementary_kernels import atan2
+from sim.scene.boxes import AXES, HALF, MIDDLE, REACH
 
 # isort: off
 # fmt: off
 from sim.scene.raycast import (
-    CENTRE_X, CENTRE_Y, GROUND, HIT_INDEX, HIT_KIND, HIT_PLACE, NORMAL_X, NORMAL_Y, NORMAL_Z, NOTHING, PILLAR, RADIUS,
-    RISER, TREAD, WALL, X1, X2, Y1, Y2,
+    BOX, CENTRE_X, CENTRE_Y, GROUND, HIT_INDEX, HIT_KIND, HIT_PLACE, NORMAL_X, NORMAL_Y, NORMAL_Z, NOTHING, PILLAR,
+    RADIUS, RISER, TREAD, WALL, X1, X2, Y1, Y2,
 )
 # fmt: on
 # isort: on
@@ -35,8 +36,8 @@ def at_pixel(field, u, v, out):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def has_solids(solids):  # type: ignore[no-untyped-def]
-    """Returns True if there are walls, pillars or stairs."""
-    return len(solids.walls) + len(solids.pillars) + len(solids.flights) > 0
+    """Returns True if there are walls, pillars, stairs or boxes."""
+    return len(solids.walls) + len(solids.pillars) + len(solids.flights) + len(solids.boxes) > 0
 
 
 @njit(cache=True)
@@ -176,6 +177,36 @@ def _on_stairs(x, y, flights):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _hit_box(o, d, box, hit, best, index):  # type: ignore[no-untyped-def]
+    """Returns the t at which the ray o + t d meets one box (22,) from outside if below `best`, and sets hit; else
+    `best`. HIT_PLACE is the axis, 0 to 2, to which the side is perpendicular."""
+    x, y, z = box[MIDDLE] - o[0], box[MIDDLE + 1] - o[1], box[MIDDLE + 2] - o[2]
+    along, length = x * d[0] + y * d[1] + z * d[2], d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+    # Most rays pass by the ball round the box.
+    if (x * x + y * y + z * z - box[REACH] * box[REACH]) * length > along * along:
+        return best
+    enter, leave, side, sign = -np.inf, np.inf, 0, 0.0
+    for k in range(3):
+        a, b, c, half = box[AXES + 3 * k], box[AXES + 3 * k + 1], box[AXES + 3 * k + 2], box[HALF + k]
+        to, speed = a * x + b * y + c * z, a * d[0] + b * d[1] + c * d[2]
+        if speed == 0.0:
+            if abs(to) > half:
+                return best
+            continue
+        first, last = (to - half) / speed, (to + half) / speed
+        if speed < 0.0:
+            first, last = last, first
+        if first > enter:
+            enter, side, sign = first, k, -1.0 if speed > 0.0 else 1.0
+        leave = min(leave, last)
+    if enter > leave or not TINY < enter < best:
+        return best
+    k = AXES + 3 * side
+    _set_hit(hit, BOX, sign * box[k], sign * box[k + 1], sign * box[k + 2], index, side)
+    return enter
+
+
+@njit(cache=True)
 def first_hit(o, d, solids, hit):  # type: ignore[no-untyped-def]
     """Returns the t (in lengths of d) of the first thing that the ray o + t d meets; inf if it meets nothing.
 
@@ -195,6 +226,8 @@ def first_hit(o, d, solids, hit):  # type: ignore[no-untyped-def]
         best = hit_pillar(o, d, solids.pillars[k], solids.pillar_height, hit, best, k)
     for k in range(len(solids.flights)):
         best = _hit_flight(o, d, solids.flights[k], hit, best, k)
+    for k in range(len(solids.boxes)):
+        best = _hit_box(o, d, solids.boxes[k], hit, best, k)
     return best
 
 

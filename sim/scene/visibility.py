@@ -2,10 +2,11 @@
 
 Each silhouette (body and head or limbs, `sim.scene.body`) is sampled on a grid over its amodal box. A sample is visible
 if it meets three conditions: it lies in the image; no nearer silhouette covers it; its line of sight meets no wall,
-pillar, step or thing first. `sim.scene.body.occlusion_distance` orders people from near to far. A wall hides people
-beyond its line. A pillar hides people further away than the tangent to it. Stairs hide if the ray meets a step before
-the upright plane through the person that faces the camera. Seen from above, walls, pillars and stairs hide nobody.
-Things (an umbrella, a car) hide if the ray through the sample meets one of their ellipsoids before all of the person's.
+pillar, step, box or thing first. `sim.scene.body.occlusion_distance` orders people from near to far. A wall hides
+people beyond its line. A pillar hides people further away than the tangent to it. Stairs and boxes hide if the ray
+meets them before the upright plane through the person that faces the camera. Things (an umbrella, a car) hide if the
+ray through the sample meets one of their ellipsoids before all of the person's. Seen from above, people are hidden by
+people and things alone.
 
 Who is visible in a recording follows from the boxes alone: each is taken for an upright person of `sim.scene.body`
 whose body and head fill it. Of two people, the one whose box ends lower in the image is the nearer (flat ground, a
@@ -21,7 +22,7 @@ import numpy as np
 from sim.elementary import inverse_3x3
 from sim.scene import body
 from sim.scene.body import Ellipsoids, Outlines, RecordedBodies
-from sim.scene.raycast import PixelRays, only_flights, pixel_rays, solids_of, unprojection
+from sim.scene.raycast import PixelRays, pixel_rays, solids_of, stairs_and_boxes, unprojection
 from sim.types import Array, Camera, Ints, Scene, Truth
 
 
@@ -72,12 +73,12 @@ def measure_visibility(
 
     ellipses = body.outlines(camera, shapes)
     box, solids, has_eye = body.outline_boxes(ellipses), solids_of(scene), camera.kind == "pinhole"
-    hides, climbs = has_eye and len(solids.walls) + len(solids.pillars) > 0, has_eye and len(solids.flights) > 0
+    hides, others = has_eye and len(solids.walls) + len(solids.pillars) > 0, stairs_and_boxes(solids)
     visibility, truncation, visible_box = sample_visibility(
         frame_starts(frame), box, np.ascontiguousarray(ellipses.centre), body.packed_inverse(ellipses.shape),
         body.occlusion_distance(camera, pos3, height), pos3[:, :2].copy(), np.array(camera.image, dtype=float),
         np.array(camera.position, dtype=float), unprojection(camera), solids if hides else None,
-        only_flights(solids.flights) if climbs else None,
+        others if has_eye and len(solids.flights) + len(solids.boxes) > 0 else None,
         None if things is None else _hiders(camera, frame, shapes, things),
     )  # fmt: skip
     return BodyVisibility(box, visibility, truncation, visible_box)

@@ -1,6 +1,7 @@
 """Compiled loops of `sim.scene.visibility`: which sample points of a person's silhouette in the image are visible.
 
-A sample is hidden by nearer people, walls, pillars or stairs. The tests compare the result with a numpy implementation.
+A sample is hidden by nearer people, walls, pillars, stairs or boxes. The tests compare the
+result with a numpy implementation.
 """
 
 from __future__ import annotations
@@ -140,8 +141,7 @@ def sample_visibility(  # type: ignore[no-untyped-def]
 
     starts (F + 1,): first row of each frame. box (R, 4) px. centre (R, K, 2) px, inverse (R, K, 3): of the parts.
     distance (R,): occlusion order, nearest lowest. pos (R, 2) m: feet. unproject (3, 3): `raycast.unprojection`.
-    solids: None without walls and pillars that can hide somebody. stairs: Solids without walls and pillars; None
-    without stairs.
+    solids: None without walls and pillars that can hide somebody. stairs: stairs and boxes alone; None without them.
     """
     # numba leaves out the branches of solids, stairs and things if they are None: half of what there is to compile.
     rows = len(box)
@@ -206,7 +206,7 @@ def sample_visibility(  # type: ignore[no-untyped-def]
                         at_pixel(unproject, u, v, d)
                         dx, dy = pos[i, 0] - eye[0], pos[i, 1] - eye[1]
                         towards = d[0] * dx + d[1] * dy
-                        # Stairs hide before the upright plane through the person that faces the eye.
+                        # They hide before the upright plane through the person that faces the eye.
                         if not hidden and towards > 0.0:
                             hidden = first_hit(eye, d, stairs, hit) < (dx * dx + dy * dy) / towards
                     if not hidden:

@@ -43,7 +43,10 @@ def read_camera(path: Path) -> Camera:
 
 def scene_document(scene: Scene) -> dict[str, Any]:
     """Returns the content of scene.json, all lengths in m: the fields of Scene as lists."""
-    return {"format": tables.FORMAT, **tables.plain(scene)}
+    document = {"format": tables.FORMAT, **tables.plain(scene)}
+    if not scene.boxes:
+        del document["boxes"]
+    return document
 
 
 class _Stairs(BaseModel):
@@ -55,11 +58,22 @@ class _Stairs(BaseModel):
     landing: Number
 
 
+class _Box(BaseModel):
+    at: Triple
+    size: Triple
+    turn_deg: Number
+    tilt_deg: Number
+    colour: Triple
+    pattern: Literal["grain", "plain", "stripes", "checks"]
+    period: Number
+    gloss: Number
+
+
 def read_scene(path: Path) -> Scene:
     """Returns the Scene in a scene.json."""
     segments = list[tuple[Pair, Pair]]
     found = tables.read_values(
         path, "correct it", size=Pair, walls=segments, pillars=list[Triple], doors=segments, service=list[Pair],
-        stairs=list[_Stairs], wall_height=Number, pillar_height=Number,
+        stairs=list[_Stairs], wall_height=Number, pillar_height=Number, boxes=(list[_Box], ()),
     )  # fmt: skip
     return Scene.of(found, found.walls, found.doors)

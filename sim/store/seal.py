@@ -154,7 +154,8 @@ def is_sequence(folder: Path) -> bool:
 def is_dataset(path: Path) -> bool:
     """Returns True if the folder is a stored sequence, a split of a dataset, or a dataset, perhaps a damaged one."""
     found = (manifest for below in ("", "*/", "*/*/") for manifest in path.glob(below + MANIFEST))
-    return any(is_ours(manifest, MARKS) is not False for manifest in found)
+    shards = (tar.with_suffix(".parquet") for below in ("", "*/", "*/*/") for tar in path.glob(below + "*-s*.tar"))
+    return any(is_ours(manifest, MARKS) is not False for manifest in found) or any(map(is_ours, shards))
 
 
 def is_own_sequence(folder: Path) -> bool:

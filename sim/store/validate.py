@@ -6,13 +6,14 @@ over, are problems, too.
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from scenarios.errors import FlockscopeError, InputError
 from sim import hashing
-from sim.store import seal
+from sim.store import packs, seal
 from sim.store.atomic import PARTIAL
 from sim.store.group_files import read_never_arrives
 from sim.store.own_files import is_side_file, split_and_name
@@ -38,12 +39,16 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
         raise _problem(folder, "no folder", "a generated dataset, a sequence, or tracks", "check the path")
     if seal.is_sequence(folder) or is_run(folder):
         return list(_faults(folder))
-    every = [*_inside(folder, seal.is_sequence), *_inside(folder, is_run)]
+    every, tars = (
+        [*_inside(folder, seal.is_sequence), *_inside(folder, is_run)],
+        sorted(filter(packs.is_named_as_shard, folder.glob("**/*.tar"))),
+    )
     partial = sorted(folder.glob(f"**/{PARTIAL}*"))
     found = [_problem(path, "left by an interrupted run", "no such file or folder") for path in partial]
-    if not every and not found:
+    if not every and not found and not tars:
         raise _problem(folder, "no sequences", "a generated dataset, or tracks", "check the path")
-    return [*found, *(fault for each in every for fault in _faults(each))]
+    packed = [fault for tar in tars if PARTIAL not in str(tar) for fault in _shard_faults(tar)]
+    return [*found, *(fault for each in every for fault in _faults(each)), *packed]
 
 
 def _inside(root: Path, kind: Callable[[Path], bool]) -> list[Path]:
@@ -52,10 +57,14 @@ def _inside(root: Path, kind: Callable[[Path], bool]) -> list[Path]:
 
 def content_hash(folder: str | Path) -> str:
     """Returns the SHA-256 of a generated dataset or sequence, from the hashes in its manifests."""
-    folders = _inside(Path(folder), seal.is_sequence)
-    if not folders:
+    folders, shards = _inside(Path(folder), seal.is_sequence), packs.shards_in(Path(folder))
+    if not folders and not shards:
         raise _problem(Path(folder), "no sequences", "a generated sequence or dataset", "give what `generate` made")
-    return hashing.dataset_hash({split_and_name(p): seal.read_manifest(p)["content_hash"] for p in folders})
+    hashes = {split_and_name(p): seal.read_manifest(p)["content_hash"] for p in folders}
+    for shard in shards:
+        split, rows = shard.absolute().parent.parent.name, packs.rows_of(packs.read_seal(shard))
+        hashes |= {f"{split}/{row[0]}": row[-1] for row in rows}
+    return hashing.dataset_hash(hashes)
 
 
 def _problem(path: Path, got: object, expected: object, remedy: str = seal.REDO) -> InputError:
@@ -75,6 +84,20 @@ def _faults(folder: Path) -> Iterator[FlockscopeError]:
             read_run_tracks(folder)
     except FlockscopeError as error:
         yield error
+
+
+def _shard_faults(tar: Path) -> Iterator[FlockscopeError]:
+    """Yields the faults of a shard and of the sequences in it, whose files are named as <shard>/<sequence>/<file>."""
+    if not packs.is_shard(tar):
+        yield _problem(tar, "a shard without a seal", f"{packs.seal_of(tar).name} beside it")
+        return
+    with tempfile.TemporaryDirectory(prefix="flockscope-") as root:
+        try:
+            for folder in packs.extract(tar, Path(root)):
+                for fault in _faults(folder):
+                    yield fault.replaced(file=str(fault.file).replace(str(folder.parent), str(tar)))
+        except FlockscopeError as error:
+            yield error
 
 
 def _other_faults(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:

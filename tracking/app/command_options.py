@@ -147,6 +147,7 @@ class GenerateOptions(PictureOptions, WorkerOptions, words="generate", run="data
     seeds: str = SEEDS(SEEDS_HELP)
     out: Path = OUT()
     stride: int = option("Store every N-th frame of the camera only.", 1, low=1, metavar="N")
+    pack: bool = option("Store shards of up to 100 sequences in place of a folder for each.", False)
 
 
 class TrackOptions(SceneOptions, BoxOptions, words="track"):
@@ -352,6 +353,8 @@ class CocoOptions(Options, words="export coco", run="export:export_coco"):
     out: Path = FILE("File to write.", metavar="FILE.json")
     person_class: str | None = PERSON_CLASS()
     min_visibility: float = LEAST_VISIBLE(SMALLER.capitalize(), MIN_VISIBILITY)
+    part_size: int | None = option(
+        "Write files of N sequences each: FILE-0000.json, …. Default: one file.", None, low=1, metavar="N")
 
 
 class YoloOptions(Options, words="export yolo", run="export:export_yolo"):

@@ -1,4 +1,4 @@
-"""Writes a dataset or recording as COCO JSON: one file with all sequences that have labelled boxes.
+"""Writes a dataset or recording as COCO JSON: all sequences that have labelled boxes, in one file or several parts.
 
 Each frame is an image and each sequence a video. Each person in the picture is an annotation: box (left, top, width,
 height in px, unclipped), person id, group id, visibility, and, where the stream ids is stored, the mask of the visible
@@ -13,12 +13,15 @@ that does find the person would pay for a false alarm.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from scenarios.errors import reject
 from sim import hashing
 from sim.store.atomic import write_file
 from sim.store.own_files import GENERATOR, output_paths, split_and_name
@@ -33,9 +36,9 @@ PERSON = {"id": 1, "name": "person", "supercategory": "person"}
 
 def coco(
     source: str | Path, out: str | Path, *, person_class: int | str | None = None,
-    min_visibility: float = MIN_VISIBILITY,
+    min_visibility: float = MIN_VISIBILITY, part_size: int | None = None,
 ) -> Exported:  # fmt: skip
-    """Writes the sequences of a source that have labelled boxes as a COCO file.
+    """Writes the sequences of a source that have labelled boxes as a COCO file, or as several.
 
     Each frame is an image, each sequence a video, both numbered from 1. Annotations have bbox [left, top, width,
     height] px (amodal, unclipped), area, iscrowd, track_id (the person's id), group_id (-1 for alone), visibility, and
@@ -43,40 +46,84 @@ def coco(
 
     Args:
         source: A dataset of one split, or recordings.
-        out: The JSON file, replaced if it exists.
+        out: The JSON file, replaced if it exists. Parts are named after it: coco.json gives coco-0000.json, ….
         person_class: Classes of people, as `open_source` takes them.
         min_visibility: Share of the body from 0 to 1; people of whom less is visible have iscrowd 1.
+        part_size: Number of sequences in a file; None: all in one. Each part is a COCO file by itself; numbers of
+            videos, images and annotations go on from part to part, and only one part is in memory.
 
     Returns:
-        The path of the file with the numbers of its images and annotations. The same dataset gives the same bytes.
+        The path `out` with the numbers of images and annotations, and the files. The same dataset gives the same bytes.
 
     Raises:
         InputError: No sequence has labelled boxes, two have one name, there are several splits, `out` lies in
-            the folder of a stored sequence or a run, or an argument is wrong.
+            the folder of a stored sequence or a run, parts of another export lie beside it, or an argument is wrong.
     """
     source, out = Path(source), Path(out)
+    few = part_size is not None and part_size < 1
+    reject(few, "", part_size, "a number of sequences above 0", "correct it", "--part-size")
     reject_sealed(out.parent)
     labelled = labelled_pictures(source, min_visibility, person_class=person_class, one_split=True)
     output_paths("", [each.sequence.name for each in labelled], source=source)
     root = source if source.is_dir() else source.parent
-    videos, images, annotations, ignored = [], list[str](), list[str](), 0
-    for k, each in enumerate(in_turn(labelled), 1):
+    size = len(labelled) if part_size is None else part_size
+    paths = [out] if part_size is None else [_part(out, k) for k in range(-(-len(labelled) // size))]
+    _reject_other_parts(out, paths)
+    counts = _Counts()
+    for k, path in enumerate(paths):
+        some = labelled[k * size : (k + 1) * size]
+        lists = _lists(some, root, counts)
+        write_file(path, _document([each.sequence for each in some], lists, root, path).encode())
+    kept = counts.annotations - counts.ignored
+    return Exported(out, counts.images, kept, counts.ignored, min_visibility, tuple(paths))
+
+
+def _part(out: Path, number: int) -> Path:
+    return out.with_name(f"{out.stem}-{number:04d}{out.suffix}")
+
+
+def _reject_other_parts(out: Path, paths: list[Path]) -> None:
+    found = re.compile(re.escape(out.stem) + r"-\d{4,}" + re.escape(out.suffix))
+    others = [p for p in sorted(out.parent.glob("*")) if found.fullmatch(p.name)] if paths != [out] else []
+    other = next((path for path in others if path not in paths), None)
+    remedy = "delete the parts of the earlier export, or choose another --out"
+    reject(other is not None, other or "", "a part of another export", f"at most {len(paths)} parts", remedy)
+
+
+@dataclass
+class _Counts:
+    """Numbers of videos, images and annotations written so far, and of those annotations that are ignored."""
+
+    videos: int = 0
+    images: int = 0
+    annotations: int = 0
+    ignored: int = 0
+
+
+def _lists(labelled: list[LabelledPictures], root: Path, counts: _Counts) -> dict[str, list[str]]:
+    """Returns the rows of a file as JSON, by the name of their list; adds their numbers to `counts`."""
+    videos, images, annotations = list[str](), list[str](), list[str]()
+    for each in in_turn(labelled):
         sequence, files = each.sequence, each.files()
         shape = dict(zip(("width", "height"), each.size, strict=True))
-        about = {"id": k, "name": sequence.name, "fps": sequence.fps, "length": sequence.length}
+        counts.videos += 1
+        about = {"id": counts.videos, "name": sequence.name, "fps": sequence.fps, "length": sequence.length}
         videos.append(json_text({**about, **shape}))
+        outside = files and not files[min(files)].absolute().is_relative_to(root.absolute())
+        got, remedy = "pictures in a shard", "unpack it with tar, and export the folders"
+        reject(outside, root, got, "pictures in folders, which the file can name", remedy)
         for index in range(1, (sequence.length or 0) + 1):
             if files and index not in files:
                 continue
+            counts.images += 1
             name = {"file_name": Path(os.path.relpath(files[index], root)).as_posix()} if files else {}
-            images.append(json_text({"id": len(images) + 1, **name, **shape, "video_id": k, "frame": index}))
-            shared = {"image_id": len(images), "video_id": k, "category_id": 1}
+            images.append(json_text({"id": counts.images, **name, **shape, "video_id": counts.videos, "frame": index}))
+            shared = {"image_id": counts.images, "video_id": counts.videos, "category_id": 1}
             for found in _annotations(each, index):
-                ignored += found["iscrowd"]
-                annotations.append(json_text({"id": len(annotations) + 1, **shared, **found}))
-    lists = {"videos": videos, "images": images, "annotations": annotations}
-    write_file(out, _document([each.sequence for each in labelled], lists, root, out).encode())
-    return Exported(out, len(images), len(annotations) - ignored, ignored, min_visibility)
+                counts.ignored += found["iscrowd"]
+                counts.annotations += 1
+                annotations.append(json_text({"id": counts.annotations, **shared, **found}))
+    return {"videos": videos, "images": images, "annotations": annotations}
 
 
 def _document(sequences: list[Sequence], lists: dict[str, list[str]], root: Path, path: Path) -> str:

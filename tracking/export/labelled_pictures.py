@@ -36,13 +36,15 @@ SEAL = "export.json"
 @dataclass(frozen=True)
 class Exported:
     """What an export wrote. path: the file or folder. pictures: number of pictures. kept, ignored: numbers of labels of
-    people who are to be found, and of people who are ignored. min_visibility: the share that divides them."""
+    people who are to be found, and of people who are ignored. min_visibility: the share that divides them. files: the
+    files written, if `path` is the name of several."""
 
     path: Path
     pictures: int
     kept: int
     ignored: int
     min_visibility: float
+    files: tuple[Path, ...] = ()
 
     @property
     def counts(self) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import os
 import os.path
 import warnings
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from itertools import islice
@@ -22,7 +22,7 @@ from scenarios.limits import FRAME_RATES, SCALES, is_number
 from scenarios.reading import is_present, require_regular
 from sim.pictures.background_sample import parse_choice
 from sim.pictures.picture_folder import SUFFIXES as PICTURES
-from sim.store import sequence_folder
+from sim.store import packs, sequence_folder
 from sim.store.numeric_text import NAME_THEM
 from sim.store.own_files import is_hidden
 from sim.store.seal import is_sequence
@@ -51,9 +51,9 @@ def open_source(
     """Opens a path that holds sequences or recordings, in any known format.
 
     Args:
-        path: A generated sequence or dataset, a MOTChallenge folder or text, a text of trajectories (TrajNet++, ETH and
-            UCY, PedPy) or of KITTI's tracking, a BIWI folder, a CAVIAR XML, a video, or a folder with some of these (of
-            texts only .ndjson) at most 3 levels down. Hidden names are skipped.
+        path: A generated sequence, shard or dataset, a MOTChallenge folder or text, a text of trajectories (TrajNet++,
+            ETH and UCY, PedPy) or of KITTI's tracking, a BIWI folder, a CAVIAR XML, a video, or a folder with some of
+            these (of texts only .ndjson) at most 3 levels down. Hidden names are skipped.
         fps: Frames per second, in place of those that the recording states.
         px_per_m: Image scale, px per m.
         camera: Calibration, or the path of its file.
@@ -124,7 +124,7 @@ def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
     reject(not os.path.exists(path), path, "nothing there", KINDS, "check the path")
     if not os.path.isdir(path):
         require_regular(path)
-        return [_open_one(path, options)]
+        return [_open_one(p, options) for p in _unpacked(path)]
     found = list(_find(path, DEPTH))
     if not found:
         got, remedy = "a folder without sequences", "check the path"
@@ -136,7 +136,11 @@ def _open(path: Path, options: RecordingOptions) -> list[Sequence]:
         elif texts := [p for p in path.iterdir() if p.suffix.lower() in TEXTS and not is_hidden(p)]:
             got, remedy = f"a folder of texts, as {min(texts).name}", "give one text, with its path"
         raise InputError(file=path, got=got, expected=KINDS, remedy=remedy)
-    return _distinct([_open_one(p, options) for p in found])
+    return _distinct([_open_one(p, options) for path in found for p in _unpacked(path)])
+
+
+def _unpacked(path: Path) -> Iterable[Path]:
+    return packs.unpacked(path.absolute()) if packs.is_shard(path) else (path,)
 
 
 def _distinct(sequences: list[Sequence]) -> list[Sequence]:
@@ -158,11 +162,13 @@ def holds_sequences(folder: Path) -> bool:
 
 
 def generated_folders(path: Path) -> list[Path]:
-    """Returns the folders of the generated sequences at a path or at most 3 levels below it, sorted.
+    """Returns the folders of the generated sequences at a path or at most 3 levels below it, sorted; of shards those
+    that they are unpacked to.
 
     Raises InputError if there are none, or a sequence is of another kind.
     """
-    found = _find(path, DEPTH) if path.is_dir() else []
+    shards = _find(path, DEPTH) if path.is_dir() else [path] if packs.is_shard(path) else []
+    found = [folder for each in shards for folder in _unpacked(each)]
     other = next((p for p in found if _kind(p) != "generated"), None)
     got = "no sequences" if other is None else f"a recording, {other.name}"
     wrong, remedy = not found or other is not None, "give what `flockscope generate` made"
@@ -229,4 +235,5 @@ def _find(folder: Path, depth: int) -> list[Path]:
 
 def _is_recording(path: Path) -> bool:
     suffix = path.suffix.lower()
-    return suffix in (*video.SUFFIXES, people_texts.NDJSON) or (suffix == ".xml" and caviar.is_caviar(path))
+    known = suffix in (*video.SUFFIXES, people_texts.NDJSON) or packs.is_shard(path)
+    return known or (suffix == ".xml" and caviar.is_caviar(path))

@@ -44,3 +44,12 @@ def test_every_catalogue_scenario_is_drawn() -> None:
         scenario = load(name)
         assert scenario.about in text(scenario)
         assert name in words_of(svg(scenario))
+
+
+def test_boxes_are_counted_and_drawn(path: Path) -> None:
+    plain, box = load(path), "{ at = [8, 5, 1], size = [2, 1, 0.5], tilt_deg = 30 }"
+    boxes = load(path, [f"world.boxes=[{box}, {box}]"])
+    assert "2 boxes" in text(boxes)
+    assert "1 box" in text(load(path, [f"world.boxes=[{box}]"]))
+    drawn = [len(list(ET.fromstring(svg(scenario)).iter(f"{SVG}path"))) for scenario in (plain, boxes)]
+    assert drawn[1] == drawn[0] + 2

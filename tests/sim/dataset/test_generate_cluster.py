@@ -26,17 +26,24 @@ def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Loopback]:
         yield cluster
 
 
-def test_the_same_bytes(tmp_path: Path, cluster: Loopback, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(
+    ("pack", "first", "count"),
+    [(False, "merge-s00000", 6), (True, "merge/merge-s00000.tar", 2)],
+    ids=["folders", "shards"],
+)
+def test_the_same_bytes(
+    tmp_path: Path, cluster: Loopback, monkeypatch: pytest.MonkeyPatch, pack: bool, first: str, count: int
+) -> None:
     """A path that is relative here is meant here."""
     monkeypatch.chdir(tmp_path)
     seen = []
-    generate(["merge", "cross"], range(3), tmp_path / "here", **SHORT)
+    generate(["merge", "cross"], range(3), tmp_path / "here", pack=pack, **SHORT)
     made = generate(
         ["merge", "cross"], range(3), "there", workers=WorkerOptions(cluster=cluster.address),
-        progress=lambda *a: seen.append(a[:2]), **SHORT,
+        progress=lambda *a: seen.append(a[:2]), pack=pack, **SHORT,
     )  # fmt: skip
-    assert made[0] == tmp_path / "there/flockscope-train/merge-s00000"
-    assert seen == [(k, 6) for k in range(1, 7)]
+    assert made[0] == tmp_path / "there/flockscope-train" / first
+    assert seen == [(k, count) for k in range(1, count + 1)]
     assert content(tmp_path / "there") == content(tmp_path / "here")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ from scenarios.errors import InputError
 from scenarios.schema.pictures import Light, LightSwitch, Picture
 from sim.hashing import canonical_hash
 from sim.render.renderer import BACKGROUNDS, Renderer
+from sim.scene.boxes import check_nobody_in_boxes
 from sim.truth.label import bodies
-from sim.types import Motion, Scene, Stairs
+from sim.types import Array, Box, Motion, Scene, Stairs
 from tests import reference_render as slow
 from tests.reference_sense import above, crowd, pinhole, small, walkers
 
@@ -25,13 +27,27 @@ BUILT = Scene(
 SHARP = Picture(noise=0.0, blur_px=0.0)
 
 
+def box(at: list[float], size: list[float], turn: float = 0.0, tilt: float = 0.0, **looks: Any) -> Box:
+    looks = {"colour": np.array([120.0, 160.0, 200.0]), "pattern": "plain", "period": 0.4, "gloss": 0.0} | looks
+    return Box(np.array(at), np.array(size), turn, tilt, **looks)
+
+
+STORED = Scene(
+    np.array([16.0, 10.0]), pillars=np.array([[11.0, 3.0, 0.2]]),
+    boxes=(
+        box([6.0, 3.0, 0.5], [1.5, 0.8, 1.0], 30.0), box([9.0, 4.0, 1.4], [2.0, 0.1, 1.4], -40.0, 35.0),
+        box([8.0, 2.0, 0.9], [0.05, 0.05, 1.8], 10.0, -20.0), box([11.0, 7.0, 2.0], [3.0, 0.06, 0.06], 15.0),
+    ),
+)  # fmt: skip
+
+
 VIEWS = {
     "high": small(pinhole(40.0)).replace(baseline=0.5),
     "low": small(pinhole(12.0, at=(8.0, -5.0, 2.2))).replace(baseline=0.5),
     "turned": small(pinhole(30.0, yaw=35.0, at=(15.0, -4.0, 6.0))).replace(baseline=0.3),
     "above": small(above(20.0), 0.5),
 }
-SCENES = {"bare": BARE, "built": BUILT}
+SCENES = {"bare": BARE, "built": BUILT, "boxes": STORED}
 
 
 def motion_in(scene: Scene, people: int = 14) -> Motion:
@@ -263,3 +279,43 @@ def test_people_wear_the_colours_that_they_are_given() -> None:
     upper, lower = (dressed.image[v[rows], u[rows]].astype(float) for rows in (v < np.median(v), v > np.median(v)))
     assert np.median(upper[:, 2] - upper[:, 0]) > 60, "red"
     assert np.median(lower[:, 0] - lower[:, 2]) > 60, "blue"
+
+
+def front_of(gloss: float = 0.0, **looks: Any) -> Array:
+    """The upper half of a side that fills the middle of the picture, in grey, as both cameras see it: (2, 60, 60)."""
+    board = box([8.0, 4.0, 2.0], [6.0, 0.1, 4.0], gloss=gloss, **looks)
+    motion = walkers(np.zeros((1, 2)), np.zeros((1, 2)), frames=1, scene=BARE.replace(boxes=(board,)))
+    camera = small(pinhole(0.0, at=(8.0, -2.0, 2.0))).replace(baseline=0.5)
+    drawn = Renderer(motion, camera, Light(shadow=0.0), SHARP).draw(1, right=True)
+    assert drawn.image is not None
+    assert drawn.right is not None
+    return np.stack([image[20:60, 60:100].astype(float).mean(axis=2) for image in (drawn.image, drawn.right)])
+
+
+def test_patterns_of_boxes_are_plain_or_repeat_exactly() -> None:
+    left, right = front_of(pattern="plain")
+    assert left.std() < 0.5
+    assert abs(left - right).max() < 1
+    assert front_of(pattern="grain")[0].std() > 3
+    period = 10 * (3.95 + 2.0) / 125  # m: 10 px on the side, 5.95 m away
+    stripes = front_of(pattern="stripes", period=period)[0]
+    assert stripes.std(axis=0).max() < 0.5  # along a stripe
+    assert np.ptp(stripes) > 20
+    assert abs(stripes[:, 10:] - stripes[:, :-10]).max() < 1
+    checks = front_of(pattern="checks", period=0.8)[0]
+    assert checks.std(axis=0).min() > 3
+    assert checks.std(axis=1).min() > 3
+
+
+def test_what_a_glossy_side_mirrors_is_no_part_of_its_surface() -> None:
+    mat, glossy = front_of(), front_of(gloss=0.5)
+    assert abs(mat[0] - mat[1]).max() < 1  # of one colour: both cameras see the same
+    assert abs(glossy[0] - mat[0]).mean() > 5
+    assert glossy[0].std() > 2 * mat[0].std()
+
+
+def test_who_walks_into_a_box_is_refused() -> None:
+    scene = BARE.replace(boxes=(box([3.0, 4.0, 1.0], [1.0, 1.0, 2.0], 45.0), box([8.0, 4.0, 2.6], [9.0, 9.0, 0.2])))
+    check_nobody_in_boxes(walkers(np.array([[3.0, 2.0], [8.0, 4.0]]), np.zeros((2, 2)), frames=2, scene=scene))
+    with pytest.raises(InputError, match=r"world.boxes.0 .*person 2 in it in frame 1 at \(3.0, 3.2\)"):
+        check_nobody_in_boxes(walkers(np.array([[3.0, 2.0], [3.0, 3.2]]), np.zeros((2, 2)), frames=2, scene=scene))

@@ -84,7 +84,7 @@ def test_rays_end_where_the_world_begins_and_surfaces_face_them() -> None:
 )
 def test_a_wall_is_hit_between_its_ends_and_below_its_top(start, direction, expected) -> None:
     """It leads from (-1, 0) to (3, 0), 2 m high."""
-    solids = Solids(np.array([[-1.0, 0.0, 3.0, 0.0]]), 2.0, np.zeros((0, 3)), 0.0, np.zeros((0, 9)))
+    solids = Solids(np.array([[-1.0, 0.0, 3.0, 0.0]]), 2.0, np.zeros((0, 3)), 0.0, np.zeros((0, 9)), np.zeros((0, 22)))
     hit = np.zeros(HIT_SLOTS)
     t = first_hit(np.array(start), np.array(direction), solids, hit)
     if expected is None:

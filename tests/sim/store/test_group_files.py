@@ -9,7 +9,7 @@ from scenarios.errors import InputError
 from sim.scene.camera import camera_rotation
 from sim.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.store.group_files import read_events, read_groups_csv, read_near, read_script
-from sim.types import Camera, Scene
+from sim.types import Box, Camera, Scene
 from tests.made_up import make_sequence, same
 
 EVENT = {"kind": "merge", "start": 1, "end": 3, "emitted": None, "before": [-1, 2], "after": [2], "members": [1, 2],
@@ -93,6 +93,8 @@ def test_cameras_and_scenes_come_back_exactly(tmp_path):
     for camera in (top, make_sequence(1).camera):
         (tmp_path / "camera.json").write_text(json.dumps(camera_document(camera)))
         same(camera, read_camera(tmp_path / "camera.json"))
-    for scene in (Scene(np.array([3.0, 4.0])), make_sequence(1).scene):
+    box = Box(np.array([1.0, 2.0, 0.5]), np.ones(3), 30.0, -5.0, np.array([200.0, 100.0, 0.0]), "checks", 0.2, 0.5)
+    boxes = Scene(np.array([3.0, 4.0]), boxes=(box, box))
+    for scene in (Scene(np.array([3.0, 4.0])), make_sequence(1).scene, boxes):
         (tmp_path / "scene.json").write_text(json.dumps(scene_document(scene)))
         same(scene, read_scene(tmp_path / "scene.json"))

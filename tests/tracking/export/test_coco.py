@@ -40,6 +40,28 @@ def test_coco_has_every_box(tmp_path):
     assert images[1]["width"] == 640
 
 
+def test_parts_hold_what_one_file_holds(tmp_path):
+    for k in range(5):
+        stored(tmp_path / f"data/{k}", replace(make_sequence(k), name=f"s{k}"), k)
+    whole = coco(tmp_path / "data", tmp_path / "all.json")
+    made = coco(tmp_path / "data", tmp_path / "coco.json", part_size=2)
+    assert [path.name for path in made.files] == ["coco-0000.json", "coco-0001.json", "coco-0002.json"]
+    assert made.counts == whole.counts
+    assert not (tmp_path / "coco.json").exists()
+    parts, every = ([json.loads(path.read_bytes()) for path in one.files] for one in (made, whole))
+    assert [len(part["videos"]) for part in parts] == [2, 2, 1]
+    for name in ("videos", "images", "annotations"):
+        assert [row for part in parts for row in part[name]] == every[0][name]
+    assert len({part["info"]["content_hash"] for part in parts}) == 3
+    for part in parts:
+        assert part["categories"] == every[0]["categories"]
+        assert {a["image_id"] for a in part["annotations"]} <= {i["id"] for i in part["images"]}
+    with pytest.raises(InputError, match=r"coco-0001.json: .*at most 1 part"):
+        coco(tmp_path / "data", tmp_path / "coco.json", part_size=5)
+    with pytest.raises(InputError, match=r"--part-size: got 0"):
+        coco(tmp_path / "data", tmp_path / "other.json", part_size=0)
+
+
 def stored(folder, sequence, seed=1, **options):
     return sequence_folder.write_sequence(folder, sequence, scenario="schema = 1\n", seed=seed, **options)
 

@@ -24,12 +24,14 @@ def generate(options: GenerateOptions) -> CommandResult:
         folders = make(
             options.names, seeds, options.out, set=settings, workers=WorkerOptions(options.workers, options.cluster),
             progress=meter.update, streams=streams, images=images, background=not options.no_background,
-            stride=options.stride,
+            stride=options.stride, pack=options.pack,
         )  # fmt: skip
-    lines = [f"{counted(len(folders), 'sequence')} in {folders[0].parent}"]
     left_out = {name: reason.line() for name, reason in folders.left_out.items()}
-    lines += [f"left out: {name}: {reason}" for name, reason in left_out.items()]
-    return CommandResult({"sequences": folders, "folder": folders[0].parent, "left_out": left_out}, "\n".join(lines))
+    what, place, key = counted(len(folders), "sequence"), folders[0].parent, "sequences"
+    if options.pack:
+        what, place, key = counted(len(folders), "shard"), place.parent, "shards"
+    lines = [f"{what} in {place}", *(f"left out: {name}: {reason}" for name, reason in left_out.items())]
+    return CommandResult({key: folders, "folder": place, "left_out": left_out}, "\n".join(lines))
 
 
 def validate(options: ValidateOptions) -> CommandResult:

@@ -35,10 +35,15 @@ def export_coco(options: CocoOptions) -> CommandResult:
     from tracking.export.coco import coco
 
     path = output_file(options.out, ".json")
-    made = coco(options.folder, path, person_class=options.person_class, min_visibility=options.min_visibility)
+    made = coco(
+        options.folder, path, person_class=options.person_class, min_visibility=options.min_visibility,
+        part_size=options.part_size,
+    )  # fmt: skip
     root = options.folder if options.folder.is_dir() else options.folder.parent
-    lines = [str(path), made.text, f"file names are relative to {root}"]
-    return CommandResult({"file": path, "root": root, **made.counts}, "\n".join(lines))
+    shown = str(path) if options.part_size is None else f"{counted(len(made.files), 'part')}, {made.files[0]} and so on"
+    lines = [shown, made.text, f"file names are relative to {root}"]
+    facts = {"file": made.files[0], "files": made.files, "root": root, **made.counts}
+    return CommandResult(facts, "\n".join(lines))
 
 
 def export_yolo(options: YoloOptions) -> CommandResult:
