@@ -1,7 +1,7 @@
 """Do detectors of people that train on simulated pictures find people in real ones?
 
     python -m benchmarks train_there --peer-python PYTHON [--from SUITE …] [--seeds 0:3] [--set K=V …]
-        [--pictures 200] [--draws 3] [--detectors hog cnn] [--rows real synthetic both] [--data FOLDER]
+        [--pictures 200] [--draws 3] [--detectors hog cnn] [--data FOLDER]
 
 Two small detectors (benchmarks/peers/run_train_there.py) train on frames 1 to 100 of PETS09-S2L1, on pictures that
 `generate` draws of suites or scenarios, or on both, and are tested on every second one of frames 101 to 200: the same
@@ -24,7 +24,6 @@ import numpy as np
 from benchmarks.support.generate_runs import GenerateRun
 from benchmarks.support.options import PETS, add_data, add_seeds, new_parser, seeds_text
 from benchmarks.support.tables import head, mean_cell, row
-from scenarios.errors import InputError
 from sim.types import Array
 from tracking.export.coco import coco
 
@@ -75,12 +74,8 @@ def labelled_pictures(source: Path, folder: Path) -> list[Picture]:
     content = json.loads(out.read_text(encoding="utf-8"))
     root, by_id = (folder / content["info"]["root"]).resolve(), dict[int, Picture]()
     for image in content["images"]:
-        by_id[image["id"]] = {
-            "file": str(root / image["file_name"]),
-            "frame": image["frame"],
-            "boxes": [],
-            "ignored": [],
-        }
+        file = {"file": str(root / image["file_name"]), "frame": image["frame"]}
+        by_id[image["id"]] = {**file, "boxes": [], "ignored": []}
     for person in content["annotations"]:
         by_id[person["image_id"]]["ignored" if person["iscrowd"] else "boxes"].append(person["bbox"])
     return list(by_id.values())
@@ -88,8 +83,6 @@ def labelled_pictures(source: Path, folder: Path) -> list[Picture]:
 
 def real_pictures(data: Path, folder: Path) -> dict[int, Picture]:
     """Returns the pictures of PETS09-S2L1 by frame; the person without labels is ignored."""
-    if not (data / PETS).is_dir():
-        raise InputError(f"{data / PETS}: no such folder; expected the recording PETS09-S2L1; set --data")
     found = {one["frame"]: one for one in labelled_pictures(data / PETS, folder)}
     for frame in range(int(UNLABELLED[0, 0]), int(UNLABELLED[-1, 0]) + 1):
         found[frame]["ignored"] = [[float(np.interp(frame, UNLABELLED[:, 0], side)) for side in UNLABELLED.T[1:]]]
@@ -105,33 +98,26 @@ def synthetic_pictures(suite: str, seeds: range, sets: list[str], folder: Path) 
 
 
 def training_sets(
-    rows: list[str], real: dict[int, Picture], synthetic: dict[str, list[Picture]], count: int, seed: int
+    real: dict[int, Picture], synthetic: dict[str, list[Picture]], count: int, seed: int
 ) -> dict[str, list[list[Picture]]]:
     """Returns the sets of pictures that each row of the table trains on."""
-    r, frames = np.random.default_rng([seed, 71]), np.array(TRAIN)
-    few, many = ([real[k] for k in r.choice(frames, n, replace=False)] for n in (FEW, MANY))
-    drawn = {name: [all_[k] for k in r.permutation(len(all_))[:count]] for name, all_ in synthetic.items()}
-    found = {f"{FEW} real": [few], f"{MANY} real": [many]} if "real" in rows else {}
-    if "synthetic" in rows:
-        found |= {f"{len(one)} of {name}": [one] for name, one in drawn.items()}
-    if "both" in rows:
-        found |= {f"{FEW} real, {len(one)} of {name}": [few, one] for name, one in drawn.items()}
+    r = np.random.default_rng([seed, 71])
+    few, many = ([real[k] for k in r.choice(TRAIN, n, replace=False)] for n in (FEW, MANY))
+    found = {f"{FEW} real": [few], f"{MANY} real": [many]}
+    for name, pictures in synthetic.items():
+        some = [pictures[k] for k in r.permutation(len(pictures))[:count]]
+        found |= {f"{len(some)} of {name}": [some], f"{FEW} real, {len(some)} of {name}": [few, some]}
     return found
 
 
 def main() -> int:
     parser = new_parser(__doc__)
     parser.add_argument("--peer-python", required=True, help="interpreter with torch, opencv-python-headless < 5")
-    parser.add_argument(
-        "--from", nargs="*", default=["standard"], metavar="SUITE", dest="suites", help="train on these"
-    )
+    parser.add_argument("--from", nargs="+", default=["standard"], metavar="SUITE", dest="suites", help="or scenarios")
     parser.add_argument("--set", action="append", default=[], metavar="K=V", help="as of generate")
     parser.add_argument("--pictures", type=int, default=200, metavar="N", help="at most so many of each suite")
     parser.add_argument("--draws", type=int, default=3, metavar="N", help="of the training pictures")
-    parser.add_argument("--detectors", nargs="*", default=["hog", "cnn"], choices=["hog", "cnn"])
-    parser.add_argument(
-        "--rows", nargs="*", default=["real", "synthetic", "both"], choices=["real", "synthetic", "both"]
-    )
+    parser.add_argument("--detectors", nargs="+", default=["hog", "cnn"], choices=["hog", "cnn"])
     add_seeds(parser, "0:3", what="of the suites: ")
     add_data(parser)
     args = parser.parse_args()
@@ -139,14 +125,13 @@ def main() -> int:
         folder = Path(place)
         real = real_pictures(args.data, folder)
         synthetic = {s: synthetic_pictures(s, args.seeds, args.set, folder) for s in args.suites}
-        draws = [training_sets(args.rows, real, synthetic, args.pictures, seed) for seed in range(args.draws)]
+        draws = [training_sets(real, synthetic, args.pictures, seed) for seed in range(args.draws)]
         test = [real[k] for k in TEST]
         truth, ignored = ([np.reshape(one[key], (-1, 4)) for one in test] for key in ("boxes", "ignored"))
         head(["trained on", *(f"{name}, AP" for name in args.detectors)])
         for name in draws[0]:
-            jobs = [
-                {"detector": d, "seed": k, "sets": draw[name]} for d in args.detectors for k, draw in enumerate(draws)
-            ]
+            sets = [draw[name] for draw in draws]
+            jobs = [{"detector": d, "seed": k, "sets": one} for d in args.detectors for k, one in enumerate(sets)]
             given, out = folder / "jobs.json", folder / "found.npz"
             given.write_text(json.dumps({"test": [one["file"] for one in test], "jobs": jobs}))
             subprocess.run([args.peer_python, RUNNER, given, out], check=True)
