@@ -125,9 +125,10 @@ def train_hog(pictures):
     return lambda picture: windows(picture, weights, shape, -1.0)
 
 
-def block(a, b, stride=1):
-    """Returns a layer from a to b channels."""
-    return nn.Sequential(nn.Conv2d(a, b, 3, stride, 1, bias=False), nn.GroupNorm(8, b), nn.ReLU())
+def block(a, b, stride=1, apart=1):
+    """Returns a layer from a to b channels, whose taps are so many cells apart."""
+    layer = nn.Conv2d(a, b, 3, stride, apart, apart, bias=False)
+    return nn.Sequential(layer, nn.GroupNorm(8, b), nn.ReLU())
 
 
 class Net(nn.Module):
@@ -137,7 +138,7 @@ class Net(nn.Module):
     def __init__(self):
         super().__init__()
         self.near = nn.Sequential(block(3, 16, 2), block(16, 32, 2), block(32, 32))
-        self.far = nn.Sequential(block(32, 64, 2), block(64, 64), block(64, 64))
+        self.far = nn.Sequential(block(32, 64, 2), block(64, 64, 1, 2), block(64, 64, 1, 3))  # sees 111 px
         self.head = nn.Sequential(block(96, 32), nn.Conv2d(32, 5, 1))
         self.head[1].bias.data[:] = torch.tensor([-4.0, 0, 0, 2.8, 4.0])
 
