@@ -25,7 +25,7 @@ LOW, HIGH = 24.0, 96.0  # px: heights of people
 WINDOW, PERSON = (32, 64), 48.0  # px
 HOG = cv2.HOGDescriptor(WINDOW, (8, 8), (4, 4), (4, 4), 9)
 POSITIVES, NEGATIVES, SEARCHED = 2000, 3000, 30  # windows, windows of each round, pictures of each round
-ZOOM, CROP, CELL, BATCH, STEPS = 1.5, 192, 4, 8, 350  # the net sees pictures ZOOM times as large
+ZOOM, CROP, CELL, BATCH, STEPS = 1.5, 192, 4, 8, 600  # the net sees pictures ZOOM times as large
 
 
 def best(boxes, scores):
