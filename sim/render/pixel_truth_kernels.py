@@ -90,6 +90,8 @@ def hide_behind_people(rows, depth, scale, other, out):  # type: ignore[no-untyp
     row, t = np.empty(6), np.empty(width)
     middle, inverse, start, step = other.outlines.middle, other.outlines.inverse, other.start, other.step
     for i in rows:
+        if other.outlines.bounds[i, END_ROW] == other.outlines.bounds[i, FIRST_ROW]:  # also who is not wholly in front
+            continue
         for e in range(middle.shape[1]):
             mu, mv, most = middle[i, e, 0], middle[i, e, 1], scale / other.nearest[i, e]
             a, b, c = inverse[i, e, XX], inverse[i, e, XY], inverse[i, e, YY]
