@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from sim.types import Detections, Truth
 
 # Raise this whenever the same scenario and seed give another truth or other detections; golden hashes check that.
-ENGINE = 7
+ENGINE = 8
 
 
 def canonical_hash(value: Any) -> str:
