@@ -72,7 +72,7 @@ class Wayfinding:
             a, b = np.broadcast_arrays(pos[:, None], pos[None])
             near &= ~blocked(a, b, groups.navigator.walls)
             for _ in range(len(columns).bit_length()):
-                near = (near[:, :, None] & near).any(axis=1)
+                near = np.any(near[:, :, None] & near, axis=1)
             first = columns[near.argmax(axis=1)]  # of those whom each sees, over others or not
             lost = first != columns[0]
             groups.apart[columns[lost]] = first[lost]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import shutil
 import socket
 import time
-import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
@@ -18,7 +17,7 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 from uuid import uuid4
 
-from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, counted, reject
+from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, reject
 from scenarios.loading.resolve import Entry, resolve
 from scenarios.loading.toml_files import dump
 from scenarios.schema.scenario import ObservationSpec
@@ -28,7 +27,7 @@ from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
 from sim.draws import drawn
 from sim.store import packs, sequence_folder
 from sim.store.atomic import PARTIAL, lock_folder, remove_partials, write_file
-from sim.store.group_files import read_immobile, read_never_arrives
+from sim.store.group_files import read_immobile, read_never_arrives, warn_of
 from sim.store.own_files import is_side_file, output_path, output_paths
 from sim.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest, reject_runs
 from sim.streams import check_streams
@@ -322,7 +321,8 @@ def generate(
             errors["seqmaps"] = error
     unfulfilled = _left_out(errors, len(jobs))
     made = Folders((job.folder for job in jobs if job.name not in unfulfilled), unfulfilled)
-    _warn_of_who_stands(made)
+    warn_of(read_never_arrives, made, "group")
+    warn_of(read_immobile, made, "person", "people")
     return made
 
 
@@ -356,15 +356,6 @@ def _generate_shards(
         if packs.shards_in(folder):
             packs.write_index(folder)
     return Folders((job.path for job in jobs), _left_out(errors, len(entries) * len(seeds)))
-
-
-def _warn_of_who_stands(folders: Iterable[Path]) -> None:
-    for read, what in ((read_never_arrives, ("group",)), (read_immobile, ("person", "people"))):
-        found = [(folder.name, one) for folder in folders for one in read(folder)]
-        if found:
-            (name, first), sequences = found[0], len({name for name, _ in found})
-            more = f"; {counted(len(found), *what)} in {counted(sequences, 'sequence')}" if len(found) > 1 else ""
-            warnings.warn(f"{name}: {first.words}{more}", stacklevel=3)
 
 
 @contextmanager

@@ -11,6 +11,8 @@ from __future__ import annotations
 import csv
 import io
 import re
+import warnings
+from collections.abc import Callable, Iterable
 from collections.abc import Sequence as Series
 from itertools import zip_longest
 from pathlib import Path
@@ -20,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, Field, model_validator
 
-from scenarios.errors import reject
+from scenarios.errors import counted, reject
 from scenarios.limits import COORDINATE, FRAMES, INTEGER
 from scenarios.reading import is_present
 from sim.arrays import joined, no_ids
@@ -101,6 +103,15 @@ def read_immobile(folder: Path) -> tuple[Immobile, ...]:
     """Returns the people of a sequence folder who stood still on the way; () if it has no such file."""
     path = folder / IMMOBILE
     return tables.read_values(path, "restore it", people=tuple[Immobile, ...]).people if is_present(path) else ()
+
+
+def warn_of(read: Callable[[Path], tuple[NeverArrives | Immobile, ...]], folders: Iterable[Path], *what: str) -> None:
+    """Warns once of all that `read` finds in sequence folders. what: it in words, singular and plural."""
+    found = [(folder.name, one) for folder in folders for one in read(folder)]
+    if found:
+        (name, first), sequences = found[0], len({name for name, _ in found})
+        more = f"; {counted(len(found), *what)} in {counted(sequences, 'sequence')}" if len(found) > 1 else ""
+        warnings.warn(f"{name}: {first.words}{more}", stacklevel=3)
 
 
 CSV_COLUMNS = ("frame", "group", "members", "x", "y", "hull", "size")

@@ -15,7 +15,7 @@ from scenarios.errors import FlockscopeError, InputError
 from sim import hashing
 from sim.store import packs, seal
 from sim.store.atomic import PARTIAL
-from sim.store.group_files import read_never_arrives
+from sim.store.group_files import read_immobile, read_never_arrives, warn_of
 from sim.store.own_files import is_side_file, split_and_name
 from sim.store.seal import is_run, read_run, run_problems
 from sim.store.track_files import read_run as read_run_tracks
@@ -29,7 +29,7 @@ def validate(folder: str | Path) -> list[FlockscopeError]:
 
     Returns:
         Leftovers of interrupted runs, then faults of each sequence and run, sorted by path; [] if all is well. If files
-        are damaged, nothing else is reported for their sequence or run.
+        are damaged, nothing else is reported for their sequence or run. Warnings tell of people who stood still.
 
     Raises:
         InputError: There is nothing to check.
@@ -102,6 +102,7 @@ def _shard_faults(tar: Path) -> Iterator[FlockscopeError]:
 
 def _other_faults(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
     lost = read_never_arrives(folder)
+    warn_of(read_immobile, [folder], "person", "people")
     named = {seal.MANIFEST, *manifest["files"]}
     for path in sorted(folder.rglob("*")):
         inside = path.relative_to(folder)

@@ -107,13 +107,15 @@ def test_who_stands() -> None:
 
 def test_generate_and_validate_say_it_and_the_remedy_helps(tmp_path: Path, capsys) -> None:
     made = ["generate", "--seeds", "0:2", "--streams", "none", "--out"]
-    bad = scene(tmp_path, CLOSED, door(0.4), duration=12.0)
+    bad = scene(tmp_path, CLOSED, door(0.4), duration=25.0)
     assert run([*made, f"{tmp_path}/bad", str(bad)]) == 0
     err = capsys.readouterr().err
     assert "warning: s-s00000: group a never arrives: " in err
     assert "2 groups in 2 sequences" in err
     assert run(["validate", f"{tmp_path}/bad", "--json"]) == 1
-    problems = json.loads(capsys.readouterr().out)["problems"]
+    out, err = capsys.readouterr()
+    assert "warning: s-s00001: person 1 stood still for " in err
+    problems = json.loads(out)["problems"]
     assert [p["got"].split(":")[0] for p in problems] == ["group a never arrives"] * 2
     folder = next(Path(tmp_path, "bad").glob("*/s-s00000"))
     (read,) = read_never_arrives(folder)
