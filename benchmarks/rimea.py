@@ -7,7 +7,7 @@ people; those of tests 9 and 15 are smaller, at the same density. PYTHON: as of 
 (benchmarks/peers/run_rimea.py). Values are means over the seeds, ✓ and ✗ say whether they are as asked. People are
 alone, in one column in groups of three. –: the model has no stairs. refused: JuPedSim stops, as the model pushes people
 into walls. Left out, as they are about evacuation software: 8 (how a building's time depends on parameters), 11 and 14
-(who takes a farther exit or way: in all models here everybody goes the shortest one). Exit code 1 if one of ours fails.
+(who takes a farther exit or way: in all models here everybody goes the shortest one).
 """
 
 from __future__ import annotations
@@ -359,7 +359,7 @@ def cell(test: Test, seeds: range, members: int, path: Callable[[Scene, int], Ar
     return test.text.format(*values).replace("inf", "never").replace("nan", "–") + (" ✓" if good else " ✗")
 
 
-def main() -> int:
+def main() -> None:
     parser = new_parser(__doc__)
     parser.add_argument("--peer-python", required=True, help="interpreter of an environment with jupedsim, shapely")
     parser.add_argument("--tests", nargs="*", default=[""], metavar="NUMBER", help="rows that begin so")
@@ -369,16 +369,13 @@ def main() -> int:
     wanted = dict.fromkeys((s, k) for test in tests if "peers" in test.columns for s in test.scenes for k in seeds)
     found = {model: theirs(args.peer_python, model, list(wanted)) for model in MODELS if wanted}
     head(["test", "asked", "flockscope", "flockscope, groups of 3", *(f"JuPedSim, {model}" for model in MODELS)])
-    fails = 0
     for test in tests:
         cells = [cell(test, seeds, n, lambda s, k, n=n: ours(s, k, n)) if word in test.columns else ""
                  for n, word in ((1, "alone"), (3, "threes"))]  # fmt: skip
-        fails += "✗" in "".join(cells)
         cells += [cell(test, seeds, 1, lambda s, k, m=m: found[m].get((s, k))) if "peers" in test.columns else "–"
                   for m in MODELS]  # fmt: skip
         row([test.name, test.asked, *cells])
-    return int(fails > 0)
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    main()
