@@ -234,7 +234,8 @@ class Motion(Frozen):
     """The motion of a whole crowd: T frames from frame 1, P people; person id = column + 1. seed: of the simulation.
     repeat: number of the suite entry's copy, or 0. fps: frames/s. pos (T, P, 2): x, y in m; vel (T, P, 2): m/s; heading
     (T, P): rad; nan while absent. present (T, P): True while in the scene. intent (T, P): number of the group that the
-    script assigns the person to (a number of its own for a person alone, -1 while absent). height, width, depth (P,):
+    script assigns the person to (a number of its own for a person alone, -1 while absent). subgroup (T, P): number of
+    the sub-group of that group, -1 while absent or without; None: no group has any. height, width, depth (P,):
     of the body, m. free_speed (P,): walking speed alone, m/s. orders: of the script. measured: states from which the
     truth is measured; None: the frames themselves. never_arrive: groups that do not reach their goal. immobile:
     people who stood still on the way. unfired: id of each order that never fired, and the reason in words. clothes (P,
@@ -260,6 +261,7 @@ class Motion(Frozen):
     immobile: tuple[Immobile, ...] = ()
     unfired: tuple[tuple[str, str], ...] = ()
     clothes: Array | None = None
+    subgroup: Ints | None = None
 
     def states(self) -> States:
         """Returns the states from which the truth is measured."""
@@ -343,15 +345,16 @@ class PixelTruth(Frozen):
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth(Frozen):
     """The truth of a sequence of T = `length` frames from frame 1: R rows sorted by (frame, id), one per person and
-    frame. frame, id (R,). group (R,): id of the person's group, -1 for alone. pos (R, 2): x, y on the ground, m. vel
-    (R, 2): m/s. box (R, 4): left, top, width, height in px, of the whole body, unclipped. visible_box (R, 4): of the
-    visible part, nan if hidden. visibility, truncation (R,): shares of the whole body that are visible (1 if unknown),
-    and outside the image. z (R,): height of the ground, m. heading (R,): rad. height (R,): of the person, m. groups,
-    groups_px: T Groups, on the ground (m) and in the image (px). labelled (T,): True for frames with group labels.
-    events, near (strangers who walk like a group): measured from the motion. orders: of the script, () without.
-    px_per_m: image scale, nan if unknown. fps: frames/s. unscored: labelled rows that are not scored; None without such
-    labels. camera, scene: of the sequence, by which boxes are compared on the ground. Fields that may be None are None
-    if unknown."""
+    frame. frame, id (R,). group (R,): id of the person's group, -1 for alone. subgroup (R,): number of the sub-group of
+    that group, such as a pair of a class, from 1, -1 for alone or without; None: no group has any. pos (R, 2): x, y on
+    the ground, m. vel (R, 2): m/s. box (R, 4): left, top, width, height in px, of the whole body, unclipped.
+    visible_box (R, 4): of the visible part, nan if hidden. visibility, truncation (R,): shares of the whole body that
+    are visible (1 if unknown), and outside the image. z (R,): height of the ground, m. heading (R,): rad. height (R,):
+    of the person, m. groups, groups_px: T Groups, on the ground (m) and in the image (px). labelled (T,): True for
+    frames with group labels. events, near (strangers who walk like a group): measured from the motion. orders: of the
+    script, () without. px_per_m: image scale, nan if unknown. fps: frames/s. unscored: labelled rows that are not
+    scored; None without such labels. camera, scene: of the sequence, by which boxes are compared on the ground. Fields
+    that may be None are None if unknown."""
 
     name: str
     fps: float
@@ -378,6 +381,7 @@ class Truth(Frozen):
     unscored: Unscored | None = None
     camera: Camera | None = None
     scene: Scene | None = None
+    subgroup: Ints | None = None
 
     def rows(self, index: int) -> slice:
         """Returns the slice of the rows of frame `index` (from 1)."""

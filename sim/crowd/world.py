@@ -100,9 +100,12 @@ class World:
         people, needed = len(self.members), count if self.between is None else max(count, int(frames.tick[-1]) + 2)
         states, intents = np.empty((needed, people, 4)), np.empty((needed, people), np.int64)
         free = np.ones((needed, people), np.bool_)
+        subgroups = np.full_like(intents, -1) if any(g.part for g in self.entering) else None
         shown = states[: len(frames.tick)] if self.between is None else np.empty((len(frames.tick), people, 4))
         for tick, (state, group) in enumerate(self.ticks(needed)):
             states[tick], intents[tick] = state, group
+            if subgroups is not None:
+                subgroups[tick] = self.groups.subgroups()
             if not tick % SCRIPT_RATE:  # `immobile_people` looks once a second
                 free[tick] = self._free_to_walk()
             if tick and self.between is not None:  # what lies between two ticks is known at the second one
@@ -110,8 +113,9 @@ class World:
         lost = tuple(self._never_arrive(states[:count]))
         motion = self._motion(states[:count], intents[:count], shown, intents[frames.tick], frames)
         return motion.replace(
-            never_arrive=lost, immobile=immobile_people(states[:count, :, :2], free[:count], SCRIPT_RATE)
-        )
+            never_arrive=lost, immobile=immobile_people(states[:count, :, :2], free[:count], SCRIPT_RATE),
+            subgroup=None if subgroups is None else subgroups[frames.tick],
+        )  # fmt: skip
 
     def _free_to_walk(self) -> Bools:
         """Returns flags (P,): False for people whom a queue, a stop, a gathering or the end of their way bids wait."""
@@ -123,9 +127,10 @@ class World:
     def _never_arrive(self, states: Array) -> Iterator[NeverArrives]:
         """Yields the groups that do not reach their goal. states (C, P, 4): at the ticks, by column."""
         since = (len(states) - 1) / SCRIPT_RATE - STAND_TIME
-        for name, g in self.groups.alive.items():
+        walking = ((name, head, g) for name, head in self.groups.alive.items() for g in self.groups.processions[head])
+        for name, head, g in walking:
             columns = [c for c in self.groups.members[g] if np.isfinite(states[-1, c, 0])]
-            if not columns or (self.groups.queue_of[columns] >= 0).any() or self.stops.stood(g, columns, since):
+            if not columns or (self.groups.queue_of[columns] >= 0).any() or self.stops.stood(head, columns, since):
                 continue
             place, (goal, _) = states[-1, columns, :2], self.groups.goals[g]
             targets = [goal] if self.groups.arrays.arrived[g] else [*self.groups.ahead(g), goal]
@@ -193,7 +198,8 @@ class World:
         gone = self.groups.remove_leaving(self.columns)
         coming = [g for g in self.waiting if g.enter <= t or (first and g.enter == 0)]
         # A group waits while people stand at its place.
-        coming = [group for group in coming if first or self._has_room(group)]
+        shut = set() if first else {group.head for group in coming if not self._has_room(group)}
+        coming = [group for group in coming if group.head not in shut]
         if not gone and not coming:
             return
         for column in gone:
@@ -204,9 +210,13 @@ class World:
             self.groups.enter(group)
             heading = self.groups.arrays.heading[group.index]
             # A walking group starts back on its way if that is free, to be at its start when the recording begins.
-            back = group.pos - self.scenario.warmup * group.speed * heading
+            far = self.scenario.warmup * group.speed * heading
             early = first and group.enter == 0 and group.walks and not len(self.scene.pillars)
-            start = back if early and not blocked(group.pos, back, self.scene.walls).any() else group.pos
+            whole = (
+                np.concatenate([part.pos for part in self.entering if part.head == group.head]) if early else group.pos
+            )
+            back = early and not blocked(whole, whole - far, self.scene.walls).any()
+            start = group.pos - far if back else group.pos
             velocity = group.speed * heading if group.walks else heading * 0
             for member, pos in zip(group.members, start, strict=True):
                 self.bodies[member.column] = self._body(pos, velocity)

@@ -72,10 +72,25 @@ def bodies(motion: Motion, camera: Camera | None, people: RecordedBodies | None 
     return Truth(
         name=motion.name, fps=motion.fps, length=len(motion.present),
         px_per_m=float("nan") if camera is None else px_per_m_at_centre(camera), frame=people.frame, id=people.id,
-        group=np.full(len(p), -1, np.int64), pos=motion.pos[t, p], vel=motion.vel[t, p],
+        group=np.full(len(p), -1, np.int64), subgroup=_subgroups(motion, t, p),
+        pos=motion.pos[t, p], vel=motion.vel[t, p],
         box=box, visibility=visibility, z=people.pos3[:, 2], heading=motion.heading[t, p], height=motion.height[p],
         truncation=truncation, visible_box=visible_box, orders=motion.orders,
     )  # fmt: skip
+
+
+def _subgroups(motion: Motion, t: Ints, p: Ints) -> Ints | None:
+    """Returns the number of the sub-group (R,), from 1 in the order of the script, of persons p in frames t.
+
+    -1 for a person without, or who is alone in it in this frame; None if no group has sub-groups. t, p (R,): from 0.
+    """
+    if motion.subgroup is None:
+        return None
+    own, people = motion.subgroup[t, p], np.zeros((len(motion.present), int(motion.subgroup.max(initial=0)) + 1), int)
+    inside = own >= 0
+    np.add.at(people, (t[inside], own[inside]), 1)
+    first = motion.subgroup[motion.subgroup >= 0].min(initial=len(people[0]))
+    return np.where(inside & (people[t, own] > 1), own - first + 1, -1)
 
 
 def label(motion: Motion, camera: Camera | None) -> Truth:
