@@ -219,7 +219,9 @@ class States(Frozen):
     """The states of a crowd from which groups and events are measured: C ticks at `rate` per s from t = 0, P people.
 
     pos, vel (C, P, 2): m, m/s; heading (C, P): rad; present (C, P); intent (C, P): number of the group that the script
-    assigns the person to. A simulated crowd has the ticks of its script, whatever the frame rate of the camera."""
+    assigns the person to. walls: (tick, walls (W, 2, 2) m since this tick) from tick 0 on, shut doors included; ():
+    those of the scene. waiting (C, P): True for people on the way to a door that
+    is shut; None: there is none. A simulated crowd has the ticks of its script, whatever the camera's frame rate."""
 
     rate: float
     pos: Array
@@ -227,6 +229,8 @@ class States(Frozen):
     heading: Array
     present: Bools
     intent: Ints
+    walls: tuple[tuple[int, Array], ...] = ()
+    waiting: Bools | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

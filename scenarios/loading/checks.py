@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import count
+from itertools import count, pairwise
 from pathlib import Path
 from typing import NoReturn
 
@@ -64,6 +64,13 @@ def _check_world(scenario: Scenario) -> None:
             got = f"a door {door.width:g} m wide at {list(door.at)}, which lies on no wall"
             remedy = "move it onto a wall, or make it narrower"
             fail(f"world.doors.{k}", got, "an opening that lies on one wall", remedy)
+        times = [t for span in door.open or () for t in span]
+        if any(a >= b for a, b in pairwise(times)):
+            got, expected = (
+                f"{[list(span) for span in door.open or ()]}",
+                "times that ascend: [[from, to], [from, to], …]",
+            )
+            fail(f"world.doors.{k}.open", got, expected, "sort them, and join what overlaps")
     for k, stairs in enumerate(world.stairs):
         if stairs.foot == stairs.head:
             fail(f"world.stairs.{k}", "foot and head at one place", "two different places", "move one of them")

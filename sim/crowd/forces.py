@@ -60,6 +60,13 @@ COS, SIN, SWAY_X, SWAY_Y, AMPLITUDE = range(5)
 # rate at which a member takes up the others' mean velocity, 1/s, and goes to its place or their middle, 1/s
 REPULSION, REACH, ALIGN, COHERE = range(4)
 
+# columns of `gate_state` (K, 3): side whose people may pass, 1.0 or -1.0, 0.0 for none, or BOTH, or SHUT, or CLOSING,
+# which people may leave only; s since this was decided, -FIRST for the side that passes a door just opened until nobody
+# of it is left; side that comes next
+HOLDER, HELD, NEXT = range(3)
+BOTH, SHUT, CLOSING = 2.0, 3.0, 4.0
+FIRST = 1e6  # s: longer than any simulation
+
 # columns of Obstacles.walls (W, 4) and .pillars (P, 3); the last one of .stairs (S, 10), after those of `terrain`
 X1, Y1, X2, Y2 = range(4)
 PILLAR_X, PILLAR_Y, PILLAR_RADIUS = range(3)

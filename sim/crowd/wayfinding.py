@@ -14,10 +14,11 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from sim.clock import SCRIPT_RATE
+from sim.crowd.forces import HELD, HOLDER, SHUT
 from sim.crowd.group_state import GroupState
 from sim.elementary import length
 from sim.geometry.walls import blocked
-from sim.types import Array
+from sim.types import Array, Bools
 
 WAIT_TIME = 20.0  # s after which nobody waits for the group any more
 TOGETHER = 2.5  # m: people who see each other so near have not lost each other
@@ -54,7 +55,19 @@ class Wayfinding:
         )  # fmt: skip
         if late or self.parted:
             self._part_the_lost(t, state)
+        self.since[groups.group_of[self.waiting()]] = t  # who waits for a door has not lost the others
         return bool(changed)
+
+    def waiting(self) -> Bools:
+        """Returns flags (P,): True for people whose next point of the way is a door that is shut, or has opened for
+        others first."""
+        groups, arrays, g = self.groups, self.groups.arrays, self.groups.group_of
+        kept = np.flatnonzero((self.gate_state[:, HOLDER] >= SHUT) | (self.gate_state[:, HELD] < 0.0))
+        if not len(kept):
+            return np.zeros(len(g), np.bool_)
+        gate = groups.gate[g, np.where(arrays.filing[g], groups.waypoint, arrays.current[g])]
+        bidden = arrays.arrived[g] | (groups.queue_of >= 0) | groups.held
+        return np.asarray(groups.present & ~bidden & np.isin(gate, kept))
 
     def _part_the_lost(self, t: float, state: Array) -> None:
         """Marks who walks without the group from now on: those whom others of the group waited for in vain.
@@ -64,12 +77,14 @@ class Wayfinding:
         groups, arrays = self.groups, self.groups.arrays
         groups.apart[:] = -1
         self.parted = False
+        navigator = groups.navigator
+        walls = np.concatenate([navigator.walls, navigator.gates[self.gate_state[:, HOLDER] == SHUT]])
         for g in np.flatnonzero(arrays.filing & (t - self.since >= WAIT_TIME)).tolist():
             columns = [c for c in groups.members[g] if groups.present[c]]
             pos = state[columns, :2]
             near = length(pos[:, None] - pos) < TOGETHER
             a, b = np.broadcast_arrays(pos[:, None], pos[None])
-            near &= ~blocked(a, b, groups.navigator.walls)
+            near &= ~blocked(a, b, walls)
             _, part = connected_components(near, directed=False)
             if part.max(initial=0):
                 self.parted = True
