@@ -221,7 +221,9 @@ class States(Frozen):
     """The states of a crowd from which groups and events are measured: C ticks at `rate` per s from t = 0, P people.
 
     pos, vel (C, P, 2): m, m/s; heading (C, P): rad; present (C, P); intent (C, P): number of the group that the script
-    assigns the person to. A simulated crowd has the ticks of its script, whatever the frame rate of the camera."""
+    assigns the person to. walls: (tick, walls (W, 2, 2) m since this tick) from tick 0 on, shut doors included; ():
+    those of the scene. waiting (C, P): True for people on the way to a door that
+    is shut; None: there is none. A simulated crowd has the ticks of its script, whatever the camera's frame rate."""
 
     rate: float
     pos: Array
@@ -229,6 +231,8 @@ class States(Frozen):
     heading: Array
     present: Bools
     intent: Ints
+    walls: tuple[tuple[int, Array], ...] = ()
+    waiting: Bools | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -236,7 +240,8 @@ class Motion(Frozen):
     """The motion of a whole crowd: T frames from frame 1, P people; person id = column + 1. seed: of the simulation.
     repeat: number of the suite entry's copy, or 0. fps: frames/s. pos (T, P, 2): x, y in m; vel (T, P, 2): m/s; heading
     (T, P): rad; nan while absent. present (T, P): True while in the scene. intent (T, P): number of the group that the
-    script assigns the person to (a number of its own for a person alone, -1 while absent). height, width, depth (P,):
+    script assigns the person to (a number of its own for a person alone, -1 while absent). subgroup (T, P): number of
+    the sub-group of that group, -1 while absent or without; None: no group has any. height, width, depth (P,):
     of the body, m. free_speed (P,): walking speed alone, m/s. orders: of the script. measured: states from which the
     truth is measured; None: the frames themselves. never_arrive: groups that do not reach their goal. immobile:
     people who stood still on the way. unfired: id of each order that never fired, and the reason in words. clothes (P,
@@ -264,6 +269,7 @@ class Motion(Frozen):
     unfired: tuple[tuple[str, str], ...] = ()
     clothes: Array | None = None
     looks: Looks | None = None
+    subgroup: Ints | None = None
 
     def states(self) -> States:
         """Returns the states from which the truth is measured."""
@@ -347,15 +353,16 @@ class PixelTruth(Frozen):
 @dataclass(frozen=True, slots=True, eq=False)
 class Truth(Frozen):
     """The truth of a sequence of T = `length` frames from frame 1: R rows sorted by (frame, id), one per person and
-    frame. frame, id (R,). group (R,): id of the person's group, -1 for alone. pos (R, 2): x, y on the ground, m. vel
-    (R, 2): m/s. box (R, 4): left, top, width, height in px, of the whole body, unclipped. visible_box (R, 4): of the
-    visible part, nan if hidden. visibility, truncation (R,): shares of the whole body that are visible (1 if unknown),
-    and outside the image. z (R,): height of the ground, m. heading (R,): rad. height (R,): of the person, m. groups,
-    groups_px: T Groups, on the ground (m) and in the image (px). labelled (T,): True for frames with group labels.
-    events, near (strangers who walk like a group): measured from the motion. orders: of the script, () without.
-    px_per_m: image scale, nan if unknown. fps: frames/s. unscored: labelled rows that are not scored; None without such
-    labels. camera, scene: of the sequence, by which boxes are compared on the ground. Fields that may be None are None
-    if unknown."""
+    frame. frame, id (R,). group (R,): id of the person's group, -1 for alone. subgroup (R,): number of the sub-group of
+    that group, such as a pair of a class, from 1, -1 for alone or without; None: no group has any. pos (R, 2): x, y on
+    the ground, m. vel (R, 2): m/s. box (R, 4): left, top, width, height in px, of the whole body, unclipped.
+    visible_box (R, 4): of the visible part, nan if hidden. visibility, truncation (R,): shares of the whole body that
+    are visible (1 if unknown), and outside the image. z (R,): height of the ground, m. heading (R,): rad. height (R,):
+    of the person, m. groups, groups_px: T Groups, on the ground (m) and in the image (px). labelled (T,): True for
+    frames with group labels. events, near (strangers who walk like a group): measured from the motion. orders: of the
+    script, () without. px_per_m: image scale, nan if unknown. fps: frames/s. unscored: labelled rows that are not
+    scored; None without such labels. camera, scene: of the sequence, by which boxes are compared on the ground. Fields
+    that may be None are None if unknown."""
 
     name: str
     fps: float
@@ -382,6 +389,7 @@ class Truth(Frozen):
     unscored: Unscored | None = None
     camera: Camera | None = None
     scene: Scene | None = None
+    subgroup: Ints | None = None
 
     def rows(self, index: int) -> slice:
         """Returns the slice of the rows of frame `index` (from 1)."""

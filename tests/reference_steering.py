@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.crowd import forces as s
-from sim.crowd.forces import AVOIDED, COUNT, GROUP, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y, QUEUE, RADIUS
+from sim.crowd.forces import AVOIDED, COUNT, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y, PROCESSION, QUEUE, RADIUS
 from sim.types import Array, Ints
 
 
@@ -39,7 +39,7 @@ def giving_way(d: Array, v: Array, other: Array) -> Array:
 
 
 def between_people(state: Array, tag: Ints) -> Array:
-    """Separation within groups and queues, avoidance and shoving between strangers, (N, 2)."""
+    """Separation within groups, processions and queues, avoidance and shoving between strangers, (N, 2)."""
     out = np.zeros((len(state), 2))
     for i in range(len(state)):
         for j in range(len(state)):
@@ -47,7 +47,7 @@ def between_people(state: Array, tag: Ints) -> Array:
             distance = np.linalg.norm(d)
             if i == j or distance >= s.PERSON_RANGE:
                 continue
-            if tag[i, GROUP] == tag[j, GROUP]:
+            if tag[i, PROCESSION] == tag[j, PROCESSION]:
                 reach, strength = s.SEPARATION_RANGE, s.SEPARATION
             elif tag[i, QUEUE] >= 0 and tag[i, QUEUE] == tag[j, QUEUE]:
                 reach, strength = 0.5, s.SEPARATION
@@ -63,8 +63,9 @@ def between_people(state: Array, tag: Ints) -> Array:
     return out
 
 
-def between_groups(status: Array) -> Array:
-    """Acceleration of each group as a whole, (G, 2), `status` as in sim.crowd.forces; the larger of two yields less."""
+def between_groups(status: Array, head: Ints) -> Array:
+    """Acceleration of each group as a whole, (G, 2), `status` as in sim.crowd.forces; the larger of two yields less.
+    Groups of one `head` (G,) do not avoid each other."""
     out = np.zeros((len(status), 2))
     for a in range(len(status)):
         for b in range(len(status)):
@@ -73,7 +74,13 @@ def between_groups(status: Array) -> Array:
                 status[a, MEAN_VX : MEAN_VY + 1] - status[b, MEAN_VX : MEAN_VY + 1],
             )
             alone = status[a, COUNT] == status[b, COUNT] == 1
-            if a == b or alone or not status[a, AVOIDED] or not status[b, AVOIDED] or np.linalg.norm(d) > s.GROUP_RANGE:
+            if (
+                head[a] == head[b]
+                or alone
+                or not status[a, AVOIDED]
+                or not status[b, AVOIDED]
+                or np.linalg.norm(d) > s.GROUP_RANGE
+            ):
                 continue
             radius = status[a, RADIUS] + status[b, RADIUS] + 2 * s.PERSON_RADIUS
             share = 2 * status[b, COUNT] / (status[a, COUNT] + status[b, COUNT])

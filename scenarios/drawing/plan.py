@@ -15,7 +15,8 @@ import numpy as np
 
 from scenarios.drawing import words as describe
 from scenarios.schema.geometry import cut_walls, queue_places
-from scenarios.schema.scenario import GroupSpec, MergeOrder, Scenario, ScriptOrder, SplitOrder, expand, group_names
+from scenarios.schema.groups import GroupSpec, group_names, parts_of
+from scenarios.schema.scenario import MergeOrder, Scenario, ScriptOrder, SplitOrder, expand
 from scenarios.schema.values import Distribution, Point, Value, bounds
 
 XY = tuple[float, float]
@@ -210,4 +211,5 @@ def _draw_start(axes: Any, group: GroupSpec, colour: str, lift: int) -> None:
     _draw_spread(axes, group.start, colour)
     axes.plot(*_at(group.start), "o", ms=10, color=colour, mec="white")
     copies = f" ×{group.repeat}" if group.repeat > 1 else ""
-    _label(axes, _at(group.start), f"{group.id}{copies} ({middle(group.size):.2g})", colour, 8 + 12 * lift)
+    people = sum(middle(part.size) for part in parts_of(group))
+    _label(axes, _at(group.start), f"{group.id}{copies} ({people:.2g})", colour, 8 + 12 * lift)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections import Counter
 
 from scenarios.loading.toml_files import toml_value
-from scenarios.schema.scenario import GroupSpec, MergeOrder, Scenario, ScriptOrder, SplitOrder, Stop, When
+from scenarios.schema.groups import GroupSpec, Stop
+from scenarios.schema.scenario import MergeOrder, Scenario, ScriptOrder, SplitOrder, When
 from scenarios.schema.values import Distribution, Point, Value
 
 AT_GOAL = {"stand": "stand there", "leave": "leave", "walk": "walk on"}
@@ -66,7 +67,8 @@ def setting(scenario: Scenario) -> list[str]:
 
 def people(group: GroupSpec) -> str:
     """Returns in words who a `group` entry of a scenario is: size, start, stops, goal, speed, time of entry."""
-    words = [count(group.size, "person", "people")]
+    parts = [f"{part.repeat} × " * (part.repeat > 1) + f"{part.id} of {number(part.size)}" for part in group.groups]
+    words = [f"{', '.join(parts)} behind each other" if parts else count(group.size, "person", "people")]
     words[0] = f"{group.repeat} groups of {words[0]}" if group.repeat > 1 else words[0]
     words.append(f"from {place(group.start)}")
     words += [f"stopping at {', '.join(map(_stop, group.stops))}"] if group.stops else []

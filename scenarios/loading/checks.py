@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from itertools import count
+from itertools import count, pairwise
 from pathlib import Path
 from typing import NoReturn
 
@@ -16,14 +16,8 @@ from scenarios.errors import InputError, counted
 from scenarios.limits import CELLS, FRAMES, PEOPLE
 from scenarios.loading.toml_files import did_you_mean
 from scenarios.schema.geometry import clearance, door_fits, queue_places
-
-# isort: off
-# fmt: off
-from scenarios.schema.scenario import (
-    GroupSpec, MergeOrder, QueueOrder, Scenario, ScriptOrder, SplitOrder, SplitPart, expand, group_names,
-)
-# fmt: on
-# isort: on
+from scenarios.schema.groups import GroupSpec, group_names, part_names, parts_of
+from scenarios.schema.scenario import MergeOrder, QueueOrder, Scenario, ScriptOrder, SplitOrder, SplitPart, expand
 from scenarios.schema.values import SURE, Distribution, Point, Value, bounds, fixed, share_within
 
 BODY = 0.2  # m: least distance from a person's middle to a wall or pillar (the radius of a body in the physics)
@@ -51,7 +45,7 @@ def _check_amounts(scenario: Scenario) -> None:
 
 def most_people(scenario: Scenario) -> float:
     """Returns how many people there can be, by sizes (powers of 2) that 999 of 1000 draws do not exceed."""
-    return sum(group.repeat * _most(group.size) for group in scenario.group)
+    return sum(group.repeat * sum(_most(part.size) for part in parts_of(group)) for group in scenario.group)
 
 
 def _most(size: Value) -> float:
@@ -70,6 +64,13 @@ def _check_world(scenario: Scenario) -> None:
             got = f"a door {door.width:g} m wide at {list(door.at)}, which lies on no wall"
             remedy = "move it onto a wall, or make it narrower"
             fail(f"world.doors.{k}", got, "an opening that lies on one wall", remedy)
+        times = [t for span in door.open or () for t in span]
+        if any(a >= b for a, b in pairwise(times)):
+            got, expected = (
+                f"{[list(span) for span in door.open or ()]}",
+                "times that ascend: [[from, to], [from, to], …]",
+            )
+            fail(f"world.doors.{k}.open", got, expected, "sort them, and join what overlaps")
     for k, stairs in enumerate(world.stairs):
         if stairs.foot == stairs.head:
             fail(f"world.stairs.{k}", "foot and head at one place", "two different places", "move one of them")
@@ -78,7 +79,7 @@ def _check_world(scenario: Scenario) -> None:
 def _check_groups(scenario: Scenario) -> None:
     seen: set[str] = set()
     for group in scenario.group:
-        for name in group_names(group):
+        for name in _all_names(group):
             if name in seen:
                 fail(f"group.{group.id}", f"a second group named {name!r}", "unique ids", "rename one")
             seen.add(name)
@@ -89,6 +90,10 @@ def _check_groups(scenario: Scenario) -> None:
         if math.isfinite(earliest) and earliest < -scenario.warmup:
             expected = f"not before the warm-up, {-scenario.warmup:g} s"
             fail(f"group.{group.id}.enter", got, expected, "enter later, or make `warmup` longer")
+
+
+def _all_names(group: GroupSpec) -> list[str]:
+    return [n for name in group_names(group) for n in (name, *(f"{name}.{part}" for part in part_names(group)))]
 
 
 def _check_points(scenario: Scenario) -> None:
@@ -151,8 +156,7 @@ def _check_script(scenario: Scenario) -> None:
     # Each merge and split ends its groups and makes new ones, whose possible sizes follow.
     alive: Sizes = {}
     for group in scenario.group:
-        low, high = bounds(group.size)
-        alive.update(dict.fromkeys(group_names(group), (max(1.0, float(round(low))), high)))
+        alive.update(dict.fromkeys(group_names(group), group.size_bounds()))
     gone: dict[str, str] = {}
     orders: list[str] = []
     for event in scenario.event:
@@ -169,7 +173,8 @@ def _check_script(scenario: Scenario) -> None:
         orders.append(event.id)
     for k, hide in enumerate(scenario.sensor.hide):
         if hide.group is not None:
-            _named(hide.group, f"sensor.hide.{k}.group", [*alive, *gone], "a group of the script")
+            parts = [name for group in scenario.group for name in _all_names(group)]
+            _named(hide.group, f"sensor.hide.{k}.group", [*alive, *gone, *parts], "a group of the script")
         if hide.end <= hide.start:
             fail(f"sensor.hide.{k}", f"{hide.start:g} to {hide.end:g} s", "an end after its start", "swap them")
 

@@ -5,14 +5,13 @@ Where a value may be a number or a distribution (scenarios.schema.values), it is
 
 from __future__ import annotations
 
-import math
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
-from scenarios.limits import FRAME_RATES, PEOPLE, PICTURE_SIZES, fits_picture
-from scenarios.schema.colours import Colours
+from scenarios.limits import FRAME_RATES, PICTURE_SIZES, fits_picture
+from scenarios.schema.groups import FASTEST, AtGoal, GroupSpec, Height, Seconds, Speed
 from scenarios.schema.looks import LooksSpec
 from scenarios.schema.pictures import Light, Picture
 from scenarios.schema.sensor import Sensor
@@ -20,25 +19,17 @@ from scenarios.schema.sensor import Sensor
 # isort: off
 # fmt: off
 from scenarios.schema.values import (
-    Distribution, FixedPoint, Model, Name, Pattern, Point, Positive, Side, Value, bounds, problem,
+    Distribution, FixedPoint, Model, Name, Pattern, Point, Positive, Side, Value, problem,
     within,
 )
 # fmt: on
 # isort: on
 from scenarios.schema.world import WorldSpec
 
-FASTEST = 10.0  # m/s: as fast as a sprinter
-Speed = Annotated[Value, within(0.05, FASTEST, " m/s")]
-Seconds = Annotated[Value, within(0.0, 3600.0, " s")]  # of standing or being served
 Noise = Annotated[float, within(0.0, 1.0, " m/s")]
-Height = Annotated[Value, within(0.3, 3.0, " m")]
 Stray = Annotated[float, within(0.0, 2.0, " m")]
 Factor = Annotated[float, within(0.0, 10.0)]
-AtGoal = Literal["stand", "leave", "walk"]
-
-
 FREE_SPEED = Distribution(normal=(1.34, 0.26), clip=(0.5, 2.2))
-GROUP_SIZE = Distribution(poisson=1.1, clip=(1, 12))
 SPACING = Distribution(normal=(0.75, 0.12), clip=(0.5, 1.2))
 HEIGHT = Distribution(normal=(1.70, 0.09), clip=(1.50, 1.95))
 SWAY = Distribution(normal=(0.024, 0.007), clip=(0.0, 0.05))
@@ -107,71 +98,6 @@ class CrowdSpec(Model):
     separation: Factor = 1.0
     alignment: Factor = 1.0
     cohesion: Factor = 1.0
-
-
-class Stop(Model):
-    """A place on the way where a group stands for a while.
-
-    Attributes:
-        at: place, m; a group stands at the free place nearest to it
-        stay: time for which people stand there, s; 0 without `until` leaves the stop out
-        until: times, s from the first recorded frame: people wait until the first of them after their arrival, then for
-            `stay`; after the last they wait to the end
-        members: number of members who stop, rounded, while the others walk on; absent: all
-    """
-
-    at: Point
-    stay: Seconds = 0.0
-    until: tuple[float, ...] = ()
-    members: Annotated[Value, within(-0.5, PEOPLE, " people")] | None = None
-
-
-def _somebody(size: Value) -> Value:
-    low = bounds(size)[0]
-    if low < 0.5:
-        got = f"a size that can be {'any number' if math.isinf(low) else f'{low:g}'}"
-        raise problem(got, "at least 1 person", "raise it, or add clip = [1, 6]")
-    return size
-
-
-class GroupSpec(Model):
-    """A group of people who belong together from the start; a person alone is a group of one.
-
-    Attributes:
-        id: name in the script; repeat = n makes the groups id-1 … id-n
-        size: number of people; rounded, at least 1
-        start: middle of the group when it enters, m
-        goal: point to which the group walks, m
-        stops: places to stop at, in order, before `via`
-        via: points to pass on the way
-        scatter: distance of each member from its place in the group when the group enters, m; drawn for each member, in
-            any direction
-        formation: rows = a place for each: pairs abreast, triads in a V, larger groups in rows of them; none = a flock:
-            no places, each member keeps to the neighbours
-        speed: speed of the whole group, m/s; absent: follows from its members' speeds
-        height: body height of each member, m; absent: crowd.height
-        clothes: colour of the upper garment, or several, one of which is drawn for each member; absent: any
-        trousers: colour of the trousers, likewise
-        enter: time of entry, s; 0 = present from the first frame; negative = during the warm-up
-        at_goal: at the goal: stand = stay in conversation, leave = leave the scene, walk = walk straight on
-        repeat: number of such groups; each is drawn independently
-    """
-
-    id: Name
-    size: Annotated[Value, AfterValidator(_somebody), within(0.5, PEOPLE, " people")] = GROUP_SIZE
-    start: Point
-    goal: Point
-    stops: tuple[Stop, ...] = ()
-    via: tuple[Point, ...] = ()
-    scatter: Annotated[Value, within(0.0, 10.0, " m")] = 0.0
-    formation: Literal["rows", "none"] = "rows"
-    speed: Speed | None = None
-    height: Height | None = None
-    clothes: Colours | None = None
-    trousers: Colours | None = None
-    enter: Value = 0.0
-    at_goal: AtGoal = "stand"
-    repeat: Annotated[int, Field(ge=1, le=5000)] = 1
 
 
 class Reach(Model):
@@ -348,11 +274,6 @@ class Scenario(Model):
     draw: dict[Name, Distribution] | None = None
     # Not a key of files: the distributions and links in places of fixed values, by key.
     draws: SkipJsonSchema[dict[str, dict[str, Any]] | None] = None
-
-
-def group_names(group: GroupSpec) -> list[str]:
-    """Returns the names of the groups that an entry of `group` makes: its id, or id-1 … id-n."""
-    return [group.id] if group.repeat == 1 else [f"{group.id}-{k + 1}" for k in range(group.repeat)]
 
 
 def expand(pattern: str, names: list[str]) -> list[str]:

@@ -18,10 +18,13 @@ class DoorSpec(Model):
     Attributes:
         at: middle of the opening, m; must lie on a wall
         width: m
+        open: times, s from the first recorded frame, from which to which the door is open; it is shut else, as the
+            doors of a vehicle are on its way; absent: always open
     """
 
     at: FixedPoint
     width: Positive = 1.2
+    open: tuple[tuple[float, float], ...] | None = None
 
 
 class StairsSpec(Model):

@@ -31,13 +31,29 @@ def has_way(scene: Scene, people: Array, goal: Array) -> bool:
     """Returns True if a body can walk from all of the points people (N, 2) m to the goal (2,) m."""
     if not len(scene.walls) + len(scene.pillars) or np.prod(scene.size) > MOST_CELLS * CELL * CELL:
         return True
-    parts = _parts(
-        *(float(x) for x in scene.size),
-        tuple(np.asarray(scene.walls, float).ravel().tolist()),
-        tuple(np.asarray(scene.pillars, float).ravel().tolist()),
-    )
+    parts = _free_parts(scene, scene.walls)
     (end, *starts) = (_part(parts, point) for point in (goal, *people))
     return all(start == end for start in starts)
+
+
+def room_sizes(scene: Scene, walls: Array, points: Array) -> list[tuple[int, int]]:
+    """Returns for each of points (N, 2) m the number of the part of the free space that it is in, and its cells.
+
+    walls (W, 2, 2), m: in place of the scene's. In a world that is too large all are in one part.
+    """
+    if np.prod(scene.size) > MOST_CELLS * CELL * CELL:
+        return [(0, 0)] * len(points)
+    parts = _free_parts(scene, walls)
+    found = [_part(parts, point) for point in points]
+    return [(part, int((parts == part).sum())) for part in found]
+
+
+def _free_parts(scene: Scene, walls: Array) -> Ints:
+    return _parts(
+        *(float(x) for x in scene.size),
+        tuple(np.asarray(walls, float).ravel().tolist()),
+        tuple(np.asarray(scene.pillars, float).ravel().tolist()),
+    )
 
 
 @lru_cache(maxsize=8)

@@ -14,7 +14,9 @@ Model: boids inside a group (Reynolds 1987). Separation: members repel each othe
 velocity; cohesion: they keep their places in the formation, or in a flock, which has none, go to the middle of their
 neighbours. Between strangers: a power law of the time to collision between strangers (Karamouzas, Skinner & Guy
 2014). *Ours*: groups also avoid each other as wholes, so strangers walk round a group and seldom through it. A group
-waits at its gathering point until all members are there.
+waits at its gathering point until all members are there. Groups of one procession follow each other on one way: each
+takes up the speed of the one ahead and corrects its distance from it, as members their places, and waits for the one
+behind.
 """
 
 from __future__ import annotations
@@ -28,8 +30,8 @@ from sim.types import Array, Bools, Ints
 # columns of `state` (N, 4): position in m, velocity in m/s
 X, Y, VX, VY = range(4)
 
-# columns of PeopleArrays.tag (N, 3)
-GROUP, MODE, QUEUE = range(3)
+# columns of PeopleArrays.tag (N, 4)
+GROUP, MODE, QUEUE, PROCESSION = range(4)
 # MODE of a person: walks with the group, to a place in a queue, or alone to the next point of the own way
 IN_GROUP, TO_TARGET, ALONE = range(3)
 
@@ -57,6 +59,13 @@ COS, SIN, SWAY_X, SWAY_Y, AMPLITUDE = range(5)
 # columns of GroupArrays.boids (G, 4): repulsion of two members at distance zero, m/s²; distance at which it ends, m;
 # rate at which a member takes up the others' mean velocity, 1/s, and goes to its place or their middle, 1/s
 REPULSION, REACH, ALIGN, COHERE = range(4)
+
+# columns of `gate_state` (K, 3): side whose people may pass, 1.0 or -1.0, 0.0 for none, or BOTH, or SHUT, or CLOSING,
+# which people may leave only; s since this was decided, -FIRST for the side that passes a door just opened until nobody
+# of it is left; side that comes next
+HOLDER, HELD, NEXT = range(3)
+BOTH, SHUT, CLOSING = 2.0, 3.0, 4.0
+FIRST = 1e6  # s: longer than any simulation
 
 # columns of Obstacles.walls (W, 4) and .pillars (P, 3); the last one of .stairs (S, 10), after those of `terrain`
 X1, Y1, X2, Y2 = range(4)
@@ -119,6 +128,8 @@ class GroupArrays(NamedTuple):
     by_x: Ints  # (G,) indices of the groups, sorted by the x of their members in the last step
     flock: Bools  # (G,) True for groups without formation
     boids: Array  # (G, 4) strengths of the forces between members
+    head: Ints  # (G,) first of the groups that walk behind each other, whose indices follow on it; alone: itself
+    gap: Array  # (G,) wanted distance from the group ahead of these, middle to middle, m
 
     @classmethod
     def empty(cls, g: int, w: int) -> GroupArrays:
@@ -127,7 +138,7 @@ class GroupArrays(NamedTuple):
             np.zeros((g, w, 2)), np.zeros((g, w), np.int64), np.zeros(g, np.int64), np.zeros(g, np.int64), np.zeros(g),
             np.tile([1.0, 0.0], (g, 1)), np.zeros(g, np.int64), np.zeros(g, np.bool_), np.zeros(g),
             np.zeros(g, np.bool_), np.zeros((g, 12)), np.zeros((g, 2)), np.arange(g), np.zeros(g, np.bool_),
-            np.tile([SEPARATION, SEPARATION_RANGE, ALIGNMENT, 1.0 / COHESION_TIME], (g, 1)),
+            np.tile([SEPARATION, SEPARATION_RANGE, ALIGNMENT, 1.0 / COHESION_TIME], (g, 1)), np.arange(g), np.zeros(g),
         )  # fmt: skip
 
     def with_room(self, w: int) -> GroupArrays:
@@ -152,14 +163,15 @@ class PeopleArrays(NamedTuple):
     gait: Array
     calm: Array  # (N, 4) x, y, vx, vy without the velocity of the sway, m, m/s
     wanted: Array  # (N, 2) wanted velocity without its fluctuation, m/s. The goal kernels overwrite both.
-    # (N, 3) columns GROUP (index), MODE (IN_GROUP, TO_TARGET or ALONE), QUEUE (index, -1 in no queue)
+    # (N, 4) columns GROUP (index), MODE (IN_GROUP, TO_TARGET or ALONE), QUEUE (index, -1 in no queue), PROCESSION
+    # (index of the head)
     tag: Ints
 
     @classmethod
     def empty(cls, n: int) -> PeopleArrays:
         """Returns arrays for n people: paces 1, tags -1, all other values 0."""
         two, four = ([np.zeros((n, k)) for _ in range(3)] for k in (2, 4))
-        tag = np.full((n, 3), -1, np.int64)
+        tag = np.full((n, 4), -1, np.int64)
         return cls(two[0], two[1], np.ones(n), four[0], np.zeros((n, 5)), four[1], two[2], tag)
 
 

@@ -19,7 +19,7 @@ from sim.elementary_kernels import exp, sort_by
 from sim.crowd.forces import (
     AVOID_GROUP, AVOID_MAX, AVOID_PERSON, AVOID_TIME, AVOIDED, COUNT, EVADING, GROUP, GROUP_RANGE, IN_GROUP,
     MAX_ACCELERATION, MEAN_VX, MEAN_VY, MEAN_X, MEAN_Y, MODE, PERSON_RADIUS, PERSON_RANGE, PILLAR_RADIUS,
-    PILLAR_X, PILLAR_Y, QUEUE, RADIUS, REACH, REPULSION, ROOM_AHEAD, SEPARATION,
+    PILLAR_X, PILLAR_Y, PROCESSION, QUEUE, RADIUS, REACH, REPULSION, ROOM_AHEAD, SEPARATION,
     SHOVE, SLOWING, USUAL_SPEED, VX, VY, WALL, WALL_RANGE, X1, X2,
     Y1, Y2, X, Y,
 )
@@ -87,7 +87,7 @@ def _candidates(rows, s, first, last, reach, touch, found, m):  # type: ignore[n
 
 
 @njit(cache=True)
-def _avoid_groups(status, push, by_x):  # type: ignore[no-untyped-def]
+def _avoid_groups(status, push, by_x, head):  # type: ignore[no-untyped-def]
     """Overwrites push (G, 2) with each group's acceleration from avoiding other groups, and sorts by_x (G,)."""
     push[:] = 0.0
     sort_by(status[:, MEAN_X].copy(), by_x)
@@ -107,7 +107,7 @@ def _avoid_groups(status, push, by_x):  # type: ignore[no-untyped-def]
             last += 1
         for k in range(_candidates(rows, s, s + np.uint64(1), last, GROUP_REACH, 0.0, found, np.uint64(0))):
             b = np.uint64(live[found[k]])
-            if status[a, COUNT] + status[b, COUNT] < 2.5:
+            if status[a, COUNT] + status[b, COUNT] < 2.5 or head[a] == head[b]:
                 continue
             dx, dy = status[a, MEAN_X] - status[b, MEAN_X], status[a, MEAN_Y] - status[b, MEAN_Y]
             wx, wy = status[a, MEAN_VX] - status[b, MEAN_VX], status[a, MEAN_VY] - status[b, MEAN_VY]
@@ -148,8 +148,9 @@ def _give_way(state, i, j, dx, dy, d, out):  # type: ignore[no-untyped-def]
 def _pair(state, tag, boids, i, j, dx, dy, d2, out):  # type: ignore[no-untyped-def]
     """Adds the forces between persons i and j to out (N, 2); (dx, dy) = position i - position j, d2 its square."""
     strength, reach, strangers = SHOVE, 2.0 * PERSON_RADIUS, False
-    if tag[i, GROUP] == tag[j, GROUP]:
-        strength, reach = boids[tag[i, GROUP], REPULSION], boids[tag[i, GROUP], REACH]
+    if tag[i, PROCESSION] == tag[j, PROCESSION]:
+        g, h = tag[i, GROUP], tag[j, GROUP]
+        strength, reach = boids[g, REPULSION], max(boids[g, REACH], boids[h, REACH])
     elif tag[i, QUEUE] >= 0 and tag[i, QUEUE] == tag[j, QUEUE]:
         strength, reach = SEPARATION, QUEUE_SEPARATION_RANGE
     else:
@@ -266,13 +267,13 @@ def _walls(state, wanted, walls, pillars, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
-def avoid(state, wanted, tag, status, push, by_x, boids, walls, pillars, out):  # type: ignore[no-untyped-def]
+def avoid(state, wanted, tag, status, push, by_x, boids, head, walls, pillars, out):  # type: ignore[no-untyped-def]
     """Adds all avoidance accelerations to out (N, 2), and cuts each sum to MAX_ACCELERATION.
 
-    state (N, 4), tag (N, 4), status (G, 12), push (G, 2), by_x (G,), walls (W, 4), pillars (P, 3): as in `forces`.
-    walls: None if there are neither walls nor pillars, so that nothing of them is compiled.
+    state (N, 4), tag (N, 4), status (G, 12), push (G, 2), by_x (G,), head (G,), walls (W, 4), pillars (P, 3): as in
+    `forces`. walls: None if there are neither walls nor pillars, so that nothing of them is compiled.
     """
-    _avoid_groups(status, push, by_x)
+    _avoid_groups(status, push, by_x, head)
     _pairs(state, tag, boids, out)
     if walls is not None:
         _walls(state, wanted, walls, pillars, out)

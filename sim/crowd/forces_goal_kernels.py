@@ -64,6 +64,7 @@ ARRIVED = 0.25  # m from the end
 HELD_UP_TIME, HELD_UP_SPEED = 2.0, 0.2  # s, m/s: a group so slow for so long near its end is held up by others
 NEAR_GOAL = 2.0  # m: others hold a group up there, and it slows down to turn
 TURNING = 0.4  # share of the speed of a group that has the near next point of its way beside or behind it
+STRAGGLING = 1.0  # m beyond its distance: the group ahead slows down
 LOOSE = 2.2  # m: a group with a larger radius is not avoided as a whole
 
 
@@ -110,8 +111,50 @@ def _spread(state, place, tag, route, kind, current, heading, status):  # type: 
 
 
 @njit(cache=True)
-def _lead_groups(route, kind, length, current, speed, heading, finish, filing, held_up, arrived, status, dt):  # type: ignore[no-untyped-def]
+def _ways_left(route, length, current, status, head):  # type: ignore[no-untyped-def]
+    """Returns the length (G,) of the way that each group of a procession has before it, m; (0,) without processions."""
+    n = len(head)
+    out = np.zeros(n if (head != np.arange(n)).any() else 0)
+    for g in range(len(out)):
+        if head[g] != g or (g + 1 < n and head[g + 1] == g):
+            x, y = status[g, MEAN_X], status[g, MEAN_Y]
+            for w in range(current[g], length[g]):
+                out[g] += _length(route[g, w, 0] - x, route[g, w, 1] - y)
+                x, y = route[g, w, 0], route[g, w, 1]
+    return out
+
+
+@njit(cache=True)
+def _room_ahead(g, left, head, gap, arrived, status):  # type: ignore[no-untyped-def]
+    """Returns by how much a group of a procession is further than its gap from the one ahead, m; inf without one."""
+    if head[g] == g or status[g - 1, COUNT] == 0.0:
+        return np.inf
+    if arrived[g - 1]:  # ways of groups that stand end where they are
+        return _length(status[g - 1, MEAN_X] - status[g, MEAN_X], status[g - 1, MEAN_Y] - status[g, MEAN_Y]) - gap[g]
+    return left[g] - left[g - 1] - gap[g]
+
+
+@njit(cache=True)
+def _in_procession(g, pace, left, head, gap, boids, arrived, status):  # type: ignore[no-untyped-def]
+    """Returns the pace of group g, m/s, by which it follows the group ahead and waits for the one behind, and the room
+    ahead, m."""
+    room = _room_ahead(g, left, head, gap, arrived, status)
+    most = pace * (1.0 + HASTE)
+    if room < np.inf:
+        follows = _length(status[g - 1, MEAN_VX], status[g - 1, MEAN_VY]) + boids[g, COHERE] * room
+        pace = min(max(follows, 0.0), most)
+    if g + 1 < len(head) and head[g + 1] == head[g] and status[g + 1, COUNT] > 0.0:
+        behind = _room_ahead(g + 1, left, head, gap, arrived, status) - STRAGGLING
+        pace = min(pace, max(most - boids[g, COHERE] * max(behind, 0.0), TURNING * most))
+    return pace, room
+
+
+@njit(cache=True)
+def _lead_groups(  # type: ignore[no-untyped-def]
+    route, kind, length, current, speed, heading, finish, filing, held_up, arrived, status, boids, head, gap, dt
+):
     """Advances each group on its way by dt (s), and sets its wanted velocity."""
+    left = _ways_left(route, length, current, status, head)
     for g in range(len(status)):
         if status[g, COUNT] == 0.0 or length[g] == 0:
             continue
@@ -130,7 +173,11 @@ def _lead_groups(route, kind, length, current, speed, heading, finish, filing, h
                 d = sqrt(dx * dx + dy * dy)
             elif goal == GATHER:
                 arrived[g] = True
-        pace = speed[g]
+        pace, room = speed[g], np.inf
+        if len(left):
+            pace, room = _in_procession(g, pace, left, head, gap, boids, arrived, status)
+            if room < ARRIVED and arrived[g - 1] and finish[g] == STAND:
+                arrived[g] = True
         if w == last and goal == END:
             if finish[g] == STAND:
                 # A group slows down before an end where it stands.
@@ -277,7 +324,7 @@ def _mark_avoided(filing, status):  # type: ignore[no-untyped-def]
 def accelerate(  # type: ignore[no-untyped-def]
     state, place, target, pace, noise, gait, calm, wanted, tag,
     route, kind, length, current, speed, heading, finish, filing, held_up, arrived, status, push, by_x, flock, boids,
-    stairs, walls, pillars, dt, out,
+    head, gap, stairs, walls, pillars, dt, out,
 ):  # fmt: skip
     """Overwrites out (N, 2) with the accelerations of all people, m/s², and advances ways and strides by dt (s).
 
@@ -292,7 +339,9 @@ def accelerate(  # type: ignore[no-untyped-def]
         calm[i, VX], calm[i, VY] = state[i, VX] - gait[i, SWAY_X], state[i, VY] - gait[i, SWAY_Y]
     _average(calm, noise, tag, status)
     _spread(calm, place, tag, route, kind, current, heading, status)
-    _lead_groups(route, kind, length, current, speed, heading, finish, filing, held_up, arrived, status, dt)
+    _lead_groups(
+        route, kind, length, current, speed, heading, finish, filing, held_up, arrived, status, boids, head, gap, dt
+    )
     middle = np.empty((len(state) if flock.any() else 0, 4))
     if len(middle):
         _flock(calm, tag, flock, middle)
@@ -302,5 +351,5 @@ def accelerate(  # type: ignore[no-untyped-def]
     )  # fmt: skip
     _mark_avoided(filing, status)
     _sway(wanted, gait, dt, out)
-    avoid(calm, wanted, tag, status, push, by_x, boids, walls, pillars, out)
+    avoid(calm, wanted, tag, status, push, by_x, boids, head, walls, pillars, out)
     return True

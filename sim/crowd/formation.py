@@ -45,6 +45,20 @@ def walking(n: int, spacing: float) -> Array:
     return np.asarray(places - places.mean(axis=0))
 
 
+def procession(sizes: list[int], spacing: float) -> tuple[list[Array], list[float]]:
+    """Returns the places (n, 2) m of walking groups of these sizes behind each other, and the gap before each of them.
+
+    Places are forward and left of the middle of all people. A gap is the distance of the group's middle from that of
+    the one ahead, m, 0 for the first; rows of two groups are as far apart as rows of one.
+    """
+    places, gaps = [walking(n, spacing) for n in sizes], [0.0]
+    for k in range(1, len(places)):
+        gaps.append(float(places[k][:, 0].max() - places[k - 1][:, 0].min()) + ROW_GAP * spacing)
+    back = np.cumsum(gaps)
+    ahead = dot(np.array(sizes, float), back) / sum(sizes) - back
+    return [own + np.array([shift, 0.0]) for own, shift in zip(places, ahead, strict=True)], gaps
+
+
 def standing(n: int, spacing: float) -> Array:
     """Returns the places (n, 2) m of a standing group: on a circle, neighbours `spacing` m apart."""
     if n == 1:

@@ -40,16 +40,18 @@ MAX_QUEUE_SPEED = 1.4  # m/s, of people on the way to their place in a queue
 class GroupState:
     """The groups of a running simulation, by group index, and their people, by column (person id - 1).
 
-    State: alive: index of each existing group by name; arrays: the ways of groups, as the kernels use them; next_group:
-    index of the next new group; settled: indices of groups that stand in a circle. By group index, also for groups that
-    ended: members (columns), spacing (m), goals (point and "stand", "leave" or "walk"); gate (G, W): the gate that each
-    waypoint lies in, -1 for none; beyond (G, W): the side of it to which the way leads, 1.0 for its left, or -1.0.
-    everybody: all people, by column, as the kernels use those who are present; its columns are also places (in the
-    formation, m), group_of (group index), mode and queue_of (index of the queue order, -1 in no queue). Also by column:
-    targets (place in the queue, or where a held person stands, m); held: True for a person who stays behind at a stop;
-    alone: True for a person who walks alone, at `share` of the speed, to the point `aims`, m; waypoint (the first one
-    not passed); apart: of people who have lost the group, the first column of those with whom they walk, else -1; gone:
-    True for a person who has come to the end of the way alone, and leaves; present; free_speed (m/s).
+    A sub-group is a group here, and the group of the script, its procession, has the index of the first one, the head.
+    State: alive: index of each existing group by name; processions: the indices of its sub-groups, front first, by
+    index; arrays: the ways of groups, as the kernels use them; next_group: index of the next new group; settled:
+    indices of groups that stand in a circle. By group index, also for groups that ended: members (columns), spacing
+    (m), goals (point and "stand", "leave" or "walk"); gate (G, W): the gate that each waypoint lies in, -1 for none;
+    beyond (G, W): the side of it to which the way leads, 1.0 for its left, or -1.0. everybody: all people, by column,
+    as the kernels use those who are present; its columns are also places (in the formation, m), group_of (group index),
+    mode and queue_of (index of the queue order, -1 in no queue). Also by column: targets (place in the queue, or where
+    a held person stands, m); held: True for a person who stays behind at a stop; alone: True for a person who walks
+    alone, at `share` of the speed, to the point `aims`, m; waypoint (the first one not passed); apart: of people who
+    have lost the group, the first column of those with whom they walk, else -1; gone: True for a person who has come to
+    the end of the way alone, and leaves; present; free_speed (m/s).
     """
 
     def __init__(self, entering: list[EnteringGroup], new: int, navigator: Navigator, crowd: CrowdSpec) -> None:
@@ -58,14 +60,15 @@ class GroupState:
         self.navigator, self.crowd = navigator, crowd
         self.arrays = GroupArrays.empty(len(entering) + new, WAY)
         self.next_group = len(entering)
-        self.alive: dict[str, int] = {g.name: g.index for g in entering}
+        self.alive: dict[str, int] = {g.name: g.head for g in entering}
+        self.processions: dict[int, list[int]] = {g.head: [] for g in entering}
         self.members: dict[int, list[int]] = {g.index: [m.column for m in g.members] for g in entering}
         self.spacing: dict[int, float] = {g.index: g.spacing for g in entering}
         self.goals: dict[int, tuple[Array, str]] = {g.index: (g.goal, g.finish) for g in entering}
         self.free_speed = np.array([m.free_speed for m in people])
         self.everybody = PeopleArrays.empty(len(people))
         self.places = self.everybody.place
-        self.group_of, self.mode, self.queue_of = self.everybody.tag.T
+        self.group_of, self.mode, self.queue_of, self.procession_of = self.everybody.tag.T
         self.targets, self.aims = np.zeros((2, len(people), 2))
         self.share = np.ones(len(people))
         self.alone, self.gone = np.zeros(len(people), np.bool_), np.zeros(len(people), np.bool_)
@@ -73,19 +76,28 @@ class GroupState:
         self.gate, self.beyond = np.full(self.arrays.kind.shape, -1), np.zeros(self.arrays.kind.shape)
         for g in entering:
             self.group_of[self.members[g.index]] = g.index
+            self.processions[g.head].append(g.index)
+            self.arrays.head[g.index], self.arrays.gap[g.index] = g.head, g.gap
             self._hold_together(g.index, g.flock)
         self.held = np.zeros(len(people), np.bool_)
         self.present = np.zeros(len(people), np.bool_)
         self.settled: set[int] = set()
 
+    def people(self, g: int) -> list[int]:
+        """Returns the columns of the members of group g, of all of its sub-groups if it has some."""
+        return [c for part in self.processions[g] for c in self.members[part]]
+
     def all_present(self, g: int) -> bool:
         """Returns True if every member of group g is in the scene."""
-        return bool(self.present[self.members[g]].all())
+        return bool(self.present[self.people(g)].all())
 
     def enter(self, group: EnteringGroup) -> None:
         """Records the group's members as present, starts its way and gives them places in the formation."""
         g = group.index
-        self.go(g, group.start, *group.leg(group.stops), group.speed)
+        way = group.leg(group.stops)
+        if not group.walks and len(self.processions[group.head]) > 1:  # each part stands where it is
+            way = [], group.pos.mean(axis=0), way[2]
+        self.go(g, group.start, *way, group.speed)
         columns = self.members[g]
         self.present[columns] = True
         places = walking(len(columns), group.spacing)
@@ -142,6 +154,23 @@ class GroupState:
             if passed >= 0:
                 self.beyond[g, k] = self.navigator.beyond(passed, passing[k], passing[min(k + 2, len(way))])
 
+    def lead(self, g: int) -> None:
+        """Gives the sub-groups behind the head g its way; they follow it."""
+        arrays = self.arrays
+        for part in self.processions[g][1:]:
+            for values in (
+                arrays.route,
+                arrays.kind,
+                arrays.length,
+                arrays.current,
+                arrays.finish,
+                self.gate,
+                self.beyond,
+            ):
+                values[part] = values[g]
+            arrays.arrived[part], arrays.filing[part], arrays.held_up[part] = False, False, 0.0
+            self.waypoint[self.members[part]] = 0
+
     def ahead(self, g: int) -> list[Array]:
         """Returns the points (2,) m that a group has yet to pass, without doors and the end of its way."""
         current, count = int(self.arrays.current[g]), int(self.arrays.length[g])
@@ -190,7 +219,7 @@ class GroupState:
         """
         g = self.next_group
         self.next_group += 1
-        self.alive[name], self.members[g] = g, sorted(columns)
+        self.alive[name], self.members[g], self.processions[g] = g, sorted(columns), [g]
         self.spacing[g] = float(np.mean([self.spacing[p] for p in parents]))
         self._hold_together(g, bool(self.arrays.flock[parents].all()))
         self.group_of[columns] = g
@@ -216,23 +245,40 @@ class GroupState:
         """
         changed = False
         arrived = self.arrays.arrived & (self.arrays.finish == STAND)
-        for g in self.alive.values():
+        for g in (part for head in self.alive.values() for part in self.processions[head]):
             if arrived[g] and g not in self.settled:
                 self.settled.add(g)
                 columns = [c for c in self.members[g] if self.present[c]]
                 pos = state[columns, :2]
-                self.take_places(columns, standing(len(columns), self.spacing[g]), pos.mean(axis=0), g, pos)
+                middle = pos.mean(axis=0)
+                if self.arrays.head[g] != g:  # it stands behind the others, not at their goal
+                    self.write_way(g, [(middle, END)], "stand", float(self.arrays.speed[g]), middle)
+                    self.arrays.arrived[g] = True
+                self.take_places(columns, standing(len(columns), self.spacing[g]), middle, g, pos)
                 changed = True
         return changed
+
+    def form_up(self, g: int, state: Array) -> None:
+        """Gives members of group g and its sub-groups, who stood, places to walk in. state (P, 4): by column."""
+        for part in self.processions[g]:
+            self.settled.discard(part)
+            columns, pos = self.members[part], state[self.members[part], :2]
+            self.take_places(columns, walking(len(columns), self.spacing[part]), pos.mean(axis=0), part, pos)
 
     def intent(self, columns: Ints) -> Ints:
         """Returns the group that each person in columns (N,) means to be in; of the lost a number beyond all groups."""
         apart = self.apart[columns]
-        return np.where(apart >= 0, len(self.arrays.length) + apart, self.group_of[columns])
+        return np.where(apart >= 0, len(self.arrays.length) + apart, self.arrays.head[self.group_of[columns]])
+
+    def subgroups(self) -> Ints:
+        """Returns the index of the sub-group of each person (P,); -1 for who is absent or in a group without any."""
+        several = np.bincount(self.arrays.head)[self.arrays.head[self.group_of]] > 1
+        return np.where(self.present & several, self.group_of, -1)
 
     def rows(self, columns: Ints) -> PeopleArrays:
         """Returns copies of the arrays of the people in columns (N,), for the kernels."""
         speed, group = self.arrays.speed[self.group_of], self.group_of
+        self.procession_of[:] = self.arrays.head[group]
         self.mode[:] = np.where(self.alone, ALONE, np.where((self.queue_of >= 0) | self.held, TO_TARGET, IN_GROUP))
         self.everybody.pace[:] = np.where(self.alone, speed * self.share, np.minimum(speed, MAX_QUEUE_SPEED))
         flocks = self.arrays.flock[group] & (self.mode == IN_GROUP)

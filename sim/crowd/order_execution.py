@@ -165,7 +165,7 @@ class PendingOrder:
         if when.after is not None:
             return when.after in come_true
         if when.distance_lt is not None:
-            gaps = _separations(state, [groups.members[groups.alive[n]] for n in names])
+            gaps = _separations(state, [groups.people(groups.alive[n]) for n in names])
             gap = max((float(gap.distance[0]) for gap in gaps), default=np.inf)
             self.nearest = min(self.nearest, gap)
             return gap < when.distance_lt
@@ -174,7 +174,7 @@ class PendingOrder:
         if g is None or not groups.all_present(g):
             return False
         at = groups.goals[g][0] if self.reach_at is None else self.reach_at
-        middle = state[groups.members[g], :2].mean(axis=0)
+        middle = state[groups.people(g), :2].mean(axis=0)
         gap = float(length(middle - at))
         self.nearest = min(self.nearest, gap)
         return gap < when.reach.radius
@@ -296,7 +296,7 @@ class OrderExecution:
     def _merge(self, pending: PendingOrder, order: MergeOrder, state: Array) -> None:
         groups, arrays = self.groups, self.groups.arrays
         parents = [self._end(name) for name in order.groups]
-        parts = [list(groups.members[g]) for g in parents]
+        parts = [groups.people(g) for g in parents]
         pending.before, speeds = tuple(map(tuple, parts)), arrays.speed[parents]
         columns = sorted(c for part in parts for c in part)
         pending.after = (tuple(columns),)
@@ -323,13 +323,14 @@ class OrderExecution:
         g = self.groups.alive.pop(name)
         # A group that is in a queue leaves it.
         for queue in self.queues.values():
-            queue.remove(g)
+            for part in self.groups.processions[g]:
+                queue.remove(part)
         return g
 
     def _split(self, pending: PendingOrder, order: SplitOrder, state: Array) -> None:
         groups = self.groups
         parent = self._end(order.group)
-        columns = groups.members[parent]
+        columns = groups.people(parent)
         pending.before = (tuple(columns),)
         r = self._rng("event", pending.index, 2)
         goals = [draw_point(part.goal, self.placement, r) for part in order.parts]
@@ -352,7 +353,8 @@ class OrderExecution:
 
     def _line_up(self, pending: PendingOrder, order: QueueOrder) -> None:
         groups = self.groups
-        queuing = [groups.alive[n] for n in concerned(order, list(groups.alive))]
+        lined = [groups.alive[n] for n in concerned(order, list(groups.alive))]
+        queuing = [part for g in lined for part in groups.processions[g]]
         for queue in self.queues.values():
             for g in queuing:
                 queue.remove(g)
@@ -364,7 +366,7 @@ class OrderExecution:
         self.queues[pending.index] = ServiceQueue(head, counters, along, order.spacing, service, coming=list(queuing))
         columns = [c for g in queuing for c in groups.members[g]]
         groups.queue_of[columns] = pending.index
-        pending.before = tuple(tuple(groups.members[g]) for g in queuing)
+        pending.before = tuple(tuple(groups.people(g)) for g in lined)
         pending.after = (tuple(sorted(columns)),)
         if order.goal is not None:
             q = self._rng("event", pending.index, 2)

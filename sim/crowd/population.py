@@ -16,9 +16,10 @@ import numpy as np
 
 from scenarios.errors import InputError, counted
 from scenarios.schema.colours import rgb
-from scenarios.schema.scenario import CrowdSpec, GroupSpec, Scenario, Stop, group_names
+from scenarios.schema.groups import GroupSpec, Stop, SubGroupSpec, group_names, part_names, parts_of
+from scenarios.schema.scenario import CrowdSpec, Scenario
 from scenarios.schema.values import Distribution, Point, Value
-from sim.crowd.formation import to_world, walking
+from sim.crowd.formation import procession, to_world
 from sim.elementary import exp, length, unit
 from sim.geometry.walls import wall_distances
 from sim.rng import autoregression, draw, normals, rng, uniforms
@@ -95,7 +96,8 @@ class Person:
     """One person of a crowd."""
 
     column: int  # in the arrays of a Motion, from 0; the person's id is column + 1
-    # (entry of the scenario's `group` list, its copy, member), each from 0; keys the person's random streams
+    # (entry of the scenario's `group` list, its copy, sub-group if it has some, member), each from 0; keys the person's
+    # random streams
     key: tuple[int, ...]
     free_speed: float  # walking speed alone, m/s
     height: float  # of the body, m
@@ -107,12 +109,13 @@ class Person:
 
 @dataclass
 class EnteringGroup:
-    """One group of the script, as it enters the scene."""
+    """One group of the script, or one of its sub-groups, as it enters the scene."""
 
-    name: str  # in the script
-    index: int  # among all groups, from 0 (-1 until it has room)
+    name: str  # of the group in the script
+    index: int  # among all groups and sub-groups, from 0
     members: list[Person]  # its people, in order
-    start: Array  # the group's middle as it enters; goal (2,), via (each (2,)): points in the world, m
+    # the middle of the script's group as it enters; goal (2,), via (each (2,)): points in the world, m
+    start: Array
     goal: Array
     via: list[Array]
     speed: float  # of the group, m/s
@@ -123,6 +126,9 @@ class EnteringGroup:
     finish: str  # at the goal "stand", "leave" the scene or "walk" on
     stops: list[PlannedStop] = field(default_factory=list)  # before `via`
     pos: Array = field(default_factory=lambda: np.zeros((0, 2)))  # (n, 2) where the members start, m
+    part: str = ""  # whole name of a sub-group, such as class.pair-1
+    head: int = -1  # index of the first sub-group of the script's group; without sub-groups its own
+    gap: float = 0.0  # wanted distance of a sub-group's middle from that of the one ahead, m
 
     @property
     def walks(self) -> bool:
@@ -176,38 +182,62 @@ def draw_population(scenario: Scenario, scene: Scene, seed: int, repeat: int) ->
     column = 0
     for k, spec in enumerate(scenario.group):
         for n, name in enumerate(group_names(spec)):
-            group = _draw_group(draws, spec, name, (k, n), column)
-            _find_room(draws, group, spec, (k, n), taken)
-            group.index = len(groups)
-            column += len(group.members)
-            groups.append(group)
-            if group.enter == 0:
-                taken.add(group.pos)
+            parts = _draw_group(draws, spec, name, (k, n), column, len(groups))
+            _find_room(draws, parts, spec, (k, n), taken)
+            groups += parts
+            for part in parts:
+                column += len(part.members)
+                if part.enter == 0:
+                    taken.add(part.pos)
     return groups
 
 
-def _draw_group(draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int], column: int) -> EnteringGroup:
-    """Draws a group and its members, without its start, `pos` and index. key: of its entry and copy."""
+def _draw_group(
+    draws: _Draws, spec: GroupSpec, name: str, key: tuple[int, int], column: int, index: int
+) -> list[EnteringGroup]:
+    """Draws a group and its members, without its start and `pos`: its sub-groups, or the group alone.
+
+    key: of its entry and copy. column, index: of its first person, and of its first sub-group.
+    """
     r = draws.rng("group", *key, 0)
-    crowd = draws.scenario.crowd
-    size = max(1, round(draw(spec.size, r)))
+    crowd, parts = draws.scenario.crowd, parts_of(spec)
+    # Each sub-group has streams of its own, so that one more changes no other.
+    streams = [draws.rng("group", *key, 3, j) for j in range(len(parts))] if spec.groups else [r]
+    sizes = [max(1, round(draw(part.size, own))) for part, own in zip(parts, streams, strict=True)]
     spacing = draw(crowd.spacing, r)
     enter = max(-draws.scenario.warmup, draw(spec.enter, r))
     own = draw(spec.speed, r) if spec.speed is not None else None
     goal = draw_point(spec.goal, draws.placement, r)
     via = [draw_point(p, draws.placement, r) for p in spec.via]
-    members = []
-    for m in range(size):
-        p = draws.rng("person", *key, m)
-        height = crowd.height if spec.height is None else spec.height
-        own_draws = (draw(crowd.free_speed, p), draw(height, p), draw(crowd.sway, p), 2 * np.pi * p.random())
-        clothes = np.array([_colour(colours, p) for colours in (spec.clothes, spec.trousers)])
-        members.append(Person(column + m, (*key, m), *own_draws, clothes))
-    speed = own if own is not None else walking_speed([m.free_speed for m in members], crowd.slowdown_per_member)
+    members: list[list[Person]] = []
+    for j, (part, size) in enumerate(zip(parts, sizes, strict=True)):
+        keys = [(*key, j, m) if spec.groups else (*key, m) for m in range(size)]
+        members.append([_draw_person(draws, spec, part, own_key, column + m) for m, own_key in enumerate(keys)])
+        column += size
+    slowest = min(walking_speed([m.free_speed for m in some], crowd.slowdown_per_member) for some in members)
     q = draws.rng("group", *key, 2)
-    stops = draw_stops(spec.stops, size, lambda point: draw_point(point, draws.placement, q), q)
-    flock = spec.formation == "none"
-    return EnteringGroup(name, -1, members, np.zeros(2), goal, via, speed, spacing, flock, enter, spec.at_goal, stops)
+    stops = draw_stops(spec.stops, sum(sizes), lambda point: draw_point(point, draws.placement, q), q)
+    names = [f"{name}.{part}" for part in part_names(spec)] or [""]
+    return [
+        EnteringGroup(
+            name, index + j, members[j], np.zeros(2), goal, via, slowest if own is None else own, spacing,
+            part.formation == "none", enter, spec.at_goal, stops, part=names[j], head=index,
+        )
+        for j, part in enumerate(parts)
+    ]  # fmt: skip
+
+
+def _draw_person(
+    draws: _Draws, spec: GroupSpec, part: GroupSpec | SubGroupSpec, key: tuple[int, ...], column: int
+) -> Person:
+    """Draws a member of a group, or of one of its sub-groups; what a sub-group does not say is as in the group."""
+    p, crowd = draws.rng("person", *key), draws.scenario.crowd
+    height = next((h for h in (part.height, spec.height) if h is not None), crowd.height)
+    own_draws = (draw(crowd.free_speed, p), draw(height, p), draw(crowd.sway, p), 2 * np.pi * p.random())
+    clothes = np.array(
+        [_colour(colours, p) for colours in (part.clothes or spec.clothes, part.trousers or spec.trousers)]
+    )
+    return Person(column, key, *own_draws, clothes)
 
 
 def _colour(colours: tuple[str, ...] | None, r: np.random.Generator) -> tuple[float, ...]:
@@ -219,11 +249,15 @@ def walking_speed(free: list[float], slowdown: float) -> float:
     return max(MIN_SPEED, float(np.mean(free)) - slowdown * (len(free) - 1))
 
 
-def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[int, int], taken: TakenPlaces) -> None:
-    """Sets group.start and group.pos so that the members stand clear; raises InputError if no try finds room."""
+def _find_room(
+    draws: _Draws, parts: list[EnteringGroup], spec: GroupSpec, key: tuple[int, int], taken: TakenPlaces
+) -> None:
+    """Sets start, pos and gap of a group's parts so that the members stand clear; InputError if no try finds room."""
     placement = draws.placement
     drawn = spec.scatter != 0.0 or any(isinstance(v, Distribution) for v in spec.start)
     r = draws.rng("group", *key, 1)
+    group, sizes = parts[0], [len(part.members) for part in parts]
+    places, gaps = procession(sizes, group.spacing)
     for _ in range(TRIES if drawn else 1):
         group.start = draw_point(spec.start, placement, r)
         via, end, _ = group.leg(group.stops)
@@ -234,13 +268,15 @@ def _find_room(draws: _Draws, group: EnteringGroup, spec: GroupSpec, key: tuple[
         # At most half-way to the first goal.
         lead = min(placement.lead * group.speed, far / 2)
         group.start = group.start + lead * heading * (far > STANDING_DISTANCE)
-        group.pos = to_world(walking(len(group.members), group.spacing), group.start, heading)
+        pos = to_world(np.concatenate(places), group.start, heading)
         if spec.scatter != 0.0:
-            group.pos += scattered(len(group.members), spec.scatter, r)
-        together = spec.scatter == 0.0 or _apart(group.pos)
-        if together and is_free(group.pos, draws.scene, taken if group.enter == 0 else TakenPlaces()):
+            pos += scattered(len(pos), spec.scatter, r)
+        together = spec.scatter == 0.0 or _apart(pos)
+        if together and is_free(pos, draws.scene, taken if group.enter == 0 else TakenPlaces()):
+            for part, gap, own in zip(parts, gaps, np.split(pos, np.cumsum(sizes)[:-1]), strict=True):
+                part.start, part.gap, part.pos = group.start, gap, own
             return
-    people = counted(len(group.members), "person", "people")
+    people = counted(sum(sizes), "person", "people")
     raise InputError(
         file=f"scenario {draws.scenario.name}", place=f"group.{spec.id}.start (seed {draws.seed})",
         got="no free place" if drawn else "a place in a wall, a pillar or another group",
@@ -312,12 +348,16 @@ def fluctuations(crowd: CrowdSpec, people: Sequence[Person], frames: int, fps: f
 def named_people(
     scenario: Scenario, scene: Scene, seed: int, repeat: int, orders: Iterable[Order]
 ) -> dict[str, tuple[int, ...]]:
-    """Returns the person ids of each group of the script, by the group's name.
+    """Returns the person ids of each group and sub-group of the script, by its name (a sub-group's: class.pair-1).
 
     orders: the orders as carried out; groups that merge and split orders made are included.
     """
     parties = draw_population(scenario, scene, seed, repeat)
-    names = {party.name: tuple(m.column + 1 for m in party.members) for party in parties}
+    names: dict[str, tuple[int, ...]] = {}
+    for party in parties:
+        ids = tuple(m.column + 1 for m in party.members)
+        names[party.name] = names.get(party.name, ()) + ids
+        names |= {party.part: ids} if party.part else {}
     after = {order.id: order.after for order in orders if order.fired is not None}
     for event in scenario.event:
         made = after.get(event.id)

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from sim.crowd.forces import END
-from sim.crowd.formation import standing, to_world, walking
+from sim.crowd.formation import standing, to_world
 from sim.crowd.group_state import GroupState
 from sim.crowd.population import EnteringGroup, PlannedStop, TakenPlaces, is_free
 from sim.elementary import length, unit
@@ -45,7 +45,7 @@ class Stops:
 
     def __init__(self, entering: Sequence[EnteringGroup], groups: GroupState, scene: Scene) -> None:
         self.groups, self.scene = groups, scene
-        self.visits = {g.index: _Visit(g, list(g.stops)) for g in entering if g.stops}
+        self.visits = {g.index: _Visit(g, list(g.stops)) for g in entering if g.stops and g.head == g.index}
         self.stray: dict[int, float] = {}
         self.left: dict[int, float] = {}
 
@@ -65,11 +65,11 @@ class Stops:
             self.left[int(self.groups.group_of[column])] = t
         changed = bool(over)
         for g, visit in list(self.visits.items()):
-            columns = self.groups.members[g]
+            columns = self.groups.people(g)
             if not self._concerns(visit, g, columns):
                 del self.visits[g]
             elif self.groups.present[columns].all():
-                changed |= self._advance(g, visit, columns, t, state)
+                changed |= self._advance(g, visit, t, state)
         return changed
 
     def standing(self) -> list[int]:
@@ -85,7 +85,8 @@ class Stops:
         exists = self.groups.alive.get(visit.group.name) == g
         return bool(visit.stops) and exists and bool((self.groups.queue_of[columns] < 0).all())
 
-    def _advance(self, g: int, visit: _Visit, columns: list[int], t: float, state: Array) -> bool:
+    def _advance(self, g: int, visit: _Visit, t: float, state: Array) -> bool:
+        columns = self.groups.members[g]
         stop, pos = visit.stops[0], state[columns, :2]
         middle = pos.mean(axis=0)
         far = float(length(middle - stop.at))
@@ -94,7 +95,7 @@ class Stops:
                 return False
             self.left[g] = t
             self._walk_on(g, visit, middle)
-            self.groups.take_places(columns, walking(len(columns), self.groups.spacing[g]), middle, g, pos)
+            self.groups.form_up(g, state)
             return True
         if not stop.whole:
             if far > STRAY:
@@ -106,9 +107,10 @@ class Stops:
             return True
         if visit.looked is None and far < LOOK_AHEAD:
             visit.looked = t
-            place = self._free_place(g, stop.at, columns, state)
+            place = self._free_place(g, stop.at, self.groups.people(g), state)
             visit.places = self._circle(g, place)
             self.groups.go(g, middle, [], place, "stand", float(self.groups.arrays.speed[g]))
+            self.groups.lead(g)
         arrived = bool(self.groups.arrays.arrived[g])
         if visit.looked is None or not (arrived or t >= visit.looked + PATIENCE):
             return False
@@ -126,6 +128,7 @@ class Stops:
         via, target, finish = visit.group.leg(visit.stops)
         self.groups.settled.discard(g)
         self.groups.go(g, middle, via, target, finish, float(self.groups.arrays.speed[g]))
+        self.groups.lead(g)
 
     def _circle(self, g: int, middle: Array) -> Array:
         places = standing(len(self.groups.members[g]), self.groups.spacing[g])

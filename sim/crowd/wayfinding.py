@@ -13,10 +13,11 @@ from __future__ import annotations
 import numpy as np
 
 from sim.clock import SCRIPT_RATE
+from sim.crowd.forces import HELD, HOLDER, SHUT
 from sim.crowd.group_state import GroupState
 from sim.elementary import length
 from sim.geometry.walls import blocked
-from sim.types import Array
+from sim.types import Array, Bools
 
 WAIT_TIME = 20.0  # s after which nobody waits for the group any more
 TOGETHER = 2.5  # m: people who see each other so near have not lost each other
@@ -53,7 +54,19 @@ class Wayfinding:
         )  # fmt: skip
         if (late or self.parted) and not round(t * SCRIPT_RATE) % SCRIPT_RATE:
             self._part_the_lost(t, state)
+        self.since[groups.group_of[self.waiting()]] = t  # who waits for a door has not lost the others
         return bool(changed)
+
+    def waiting(self) -> Bools:
+        """Returns flags (P,): True for people whose next point of the way is a door that is shut, or has opened for
+        others first."""
+        groups, arrays, g = self.groups, self.groups.arrays, self.groups.group_of
+        kept = np.flatnonzero((self.gate_state[:, HOLDER] >= SHUT) | (self.gate_state[:, HELD] < 0.0))
+        if not len(kept):
+            return np.zeros(len(g), np.bool_)
+        gate = groups.gate[g, np.where(arrays.filing[g], groups.waypoint, arrays.current[g])]
+        bidden = arrays.arrived[g] | (groups.queue_of >= 0) | groups.held
+        return np.asarray(groups.present & ~bidden & np.isin(gate, kept))
 
     def _part_the_lost(self, t: float, state: Array) -> None:
         """Marks, once a second, who walks without the group: those whom others of the group waited for in vain.
@@ -63,6 +76,8 @@ class Wayfinding:
         groups, arrays = self.groups, self.groups.arrays
         groups.apart[:] = -1
         self.parted = False
+        navigator = groups.navigator
+        walls = np.concatenate([navigator.walls, navigator.gates[self.gate_state[:, HOLDER] == SHUT]])
         for g in np.flatnonzero(arrays.filing & (t - self.since >= WAIT_TIME)).tolist():
             columns = np.array([c for c in groups.members[g] if groups.present[c]], np.int64)
             if len(columns) < 2:
@@ -70,7 +85,7 @@ class Wayfinding:
             pos = state[columns, :2]
             near = length(pos[:, None] - pos) < TOGETHER
             a, b = np.broadcast_arrays(pos[:, None], pos[None])
-            near &= ~blocked(a, b, groups.navigator.walls)
+            near &= ~blocked(a, b, walls)
             for _ in range(len(columns).bit_length()):
                 near = np.any(near[:, :, None] & near, axis=1)
             first = columns[near.argmax(axis=1)]  # of those whom each sees, over others or not

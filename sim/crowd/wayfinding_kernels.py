@@ -11,12 +11,8 @@ from math import sqrt
 import numpy as np
 
 from sim.compiler import njit
-from sim.crowd.forces import END, GATHER, LEAVE, X, Y
+from sim.crowd.forces import BOTH, END, GATHER, HELD, HOLDER, LEAVE, NEXT, SHUT, X, Y
 
-# columns of `gate_state` (K, 3): side whose people may pass, 1.0 or -1.0, 0.0 for none, or BOTH; s since this was
-# decided; side that comes next
-HOLDER, HELD, NEXT = range(3)
-BOTH = 2.0
 FREE, CORNER = -1, -2  # no gate, but a point of the scenario's, or one round the end of a wall
 
 BODY, TOUCH = 0.2, 0.01  # m: people walk no nearer past the end of a wall; ends so near are one
@@ -227,7 +223,9 @@ def _take_turns(gates, state, wants, side, gate_state, dt):  # type: ignore[no-u
     for k in range(n):
         opposed[k, 0], opposed[k, 1] = waiting[k, 1] > 0, waiting[k, 0] > 0
         _, _, width = _across(gates, k, 0.0, 0.0)
-        if width > LANES:
+        if gate_state[k, HOLDER] >= SHUT:
+            continue
+        if width > LANES and gate_state[k, HELD] >= 0.0:
             gate_state[k, HOLDER], gate_state[k, HELD] = BOTH, 0.0
             continue
         h = gate_state[k, HOLDER] if gate_state[k, HOLDER] != BOTH else 0.0
@@ -434,7 +432,8 @@ def find_ways(  # type: ignore[no-untyped-def]
         if k >= 0:
             along, across, width = _across(gates, k, x, y)
             within = across * side[i] < PASSED and abs(along) < 0.5 * width
-            turn = within or gate_state[k, HOLDER] == BOTH or gate_state[k, HOLDER] == side[i]
+            holder = gate_state[k, HOLDER]
+            turn = holder != SHUT and (within or holder == BOTH or holder == side[i])
             may = turn or along * along + across * across > DEMAND * DEMAND
             against = opposed[k, 1 if side[i] > 0.0 else 0]
             aim[i, X], aim[i, Y], moves = _walk_through(gates, k, x, y, side[i], against, may)

@@ -30,6 +30,7 @@ from sim.crowd.navigation import Navigator, scene_of
 from sim.crowd.order_execution import OrderExecution, groups_made
 from sim.crowd.population import BODY_RADIUS, EnteringGroup, draw_population, fluctuations, script_placement
 from sim.crowd.stops import Stops
+from sim.crowd.timed_doors import TimedDoors
 from sim.crowd.wayfinding import Wayfinding
 from sim.draws import drawn
 from sim.elementary import cos, length, sin
@@ -72,6 +73,9 @@ class World:
         self.orders = OrderExecution(scenario, self.groups, script_placement(scenario, seed, repeat), seed, repeat)
         self.stops = Stops(self.entering, self.groups, self.scene)
         self.wayfinding = Wayfinding(self.groups)
+        self.doors = TimedDoors(scenario.world, self.scene, self.wayfinding.gate_state)
+        self.shut: dict[int, pymunk.Segment] = {}
+        self.walls = [(0, self.scene.walls)]
         stairs = np.column_stack([flight_rows(self.scene), [spec.slowdown for spec in scenario.world.stairs]])
         self.obstacles = Obstacles.of(stairs, np.array(self.scene.walls).reshape(-1, 4), np.array(self.scene.pillars))
         self.space = _space(self.scene)
@@ -87,6 +91,8 @@ class World:
         self.people = PeopleArrays.empty(0)
         self.state = np.zeros((0, 4))
         self.force = np.zeros((0, 2))
+        if self.doors.times:
+            self._move_doors(0)
         self._read_buffer, self._write_buffer = pymunk.batch.Buffer(), pymunk.batch.Buffer()
 
     def run(self) -> Motion:
@@ -100,32 +106,44 @@ class World:
         people, needed = len(self.members), count if self.between is None else max(count, int(frames.tick[-1]) + 2)
         states, intents = np.empty((needed, people, 4)), np.empty((needed, people), np.int64)
         free = np.ones((needed, people), np.bool_)
+        subgroups = np.full_like(intents, -1) if any(g.part for g in self.entering) else None
+        waiting = np.zeros_like(free) if self.doors.times else None
         shown = states[: len(frames.tick)] if self.between is None else np.empty((len(frames.tick), people, 4))
         for tick, (state, group) in enumerate(self.ticks(needed)):
             states[tick], intents[tick] = state, group
+            if subgroups is not None:
+                subgroups[tick] = self.groups.subgroups()
+            if waiting is not None:
+                waiting[tick] = self.wayfinding.waiting()
             if not tick % SCRIPT_RATE:  # `immobile_people` looks once a second
                 free[tick] = self._free_to_walk()
             if tick and self.between is not None:  # what lies between two ticks is known at the second one
                 shown[frames.within(tick - 1)] = frames.states(tick - 1, self.between)
         lost = tuple(self._never_arrive(states[:count]))
-        motion = self._motion(states[:count], intents[:count], shown, intents[frames.tick], frames)
+        motion = self._motion(
+            states[:count], intents[:count], shown, intents[frames.tick], frames,
+            None if waiting is None else waiting[:count],
+        )  # fmt: skip
         return motion.replace(
-            never_arrive=lost, immobile=immobile_people(states[:count, :, :2], free[:count], SCRIPT_RATE)
-        )
+            never_arrive=lost, immobile=immobile_people(states[:count, :, :2], free[:count], SCRIPT_RATE),
+            subgroup=None if subgroups is None else subgroups[frames.tick],
+        )  # fmt: skip
 
     def _free_to_walk(self) -> Bools:
         """Returns flags (P,): False for people whom a queue, a stop, a gathering or the end of their way bids wait."""
         groups, arrays = self.groups, self.groups.arrays
         waits = arrays.arrived | (arrays.kind[np.arange(len(arrays.kind)), arrays.current] == GATHER)
         waits[self.stops.standing()] = True
-        return np.asarray(~(waits[groups.group_of] | (groups.queue_of >= 0) | groups.held))
+        at_door = self.wayfinding.waiting()
+        return np.asarray(~(waits[groups.group_of] | (groups.queue_of >= 0) | groups.held | at_door))
 
     def _never_arrive(self, states: Array) -> Iterator[NeverArrives]:
         """Yields the groups that do not reach their goal. states (C, P, 4): at the ticks, by column."""
         since = (len(states) - 1) / SCRIPT_RATE - STAND_TIME
-        for name, g in self.groups.alive.items():
+        walking = ((name, head, g) for name, head in self.groups.alive.items() for g in self.groups.processions[head])
+        for name, head, g in walking:
             columns = [c for c in self.groups.members[g] if np.isfinite(states[-1, c, 0])]
-            if not columns or (self.groups.queue_of[columns] >= 0).any() or self.stops.stood(g, columns, since):
+            if not columns or (self.groups.queue_of[columns] >= 0).any() or self.stops.stood(head, columns, since):
                 continue
             place, (goal, _) = states[-1, columns, :2], self.groups.goals[g]
             targets = [goal] if self.groups.arrays.arrived[g] else [*self.groups.ahead(g), goal]
@@ -139,6 +157,7 @@ class World:
 
     def _stands_short(self, g: int, columns: list[int], states: Array, middle: Array, goal: Array) -> bool:
         waits = self.groups.arrays.arrived[g] or self.groups.gathers(g) or float(length(middle - goal)) < NEAR_GOAL
+        waits |= bool(self.wayfinding.waiting()[columns].any())
         return not waits and stands(states[:, columns], SCRIPT_RATE)
 
     def ticks(self, length: int) -> Iterator[tuple[Array, Ints]]:
@@ -158,6 +177,8 @@ class World:
             if tick >= 0:
                 self.group_of[self.columns] = self.groups.intent(self.columns)
                 changed |= self.orders.advance(tick, t, self.states)
+            if self.doors.advance(t, self.states[:, :2]):
+                self._move_doors(max(tick, 0))
             changed |= self.wayfinding.advance(t, self.states)
             if changed:
                 self.people = self.groups.rows(self.columns)
@@ -188,6 +209,17 @@ class World:
                 self.between[step, self.columns] = self.state
         self.groups.everybody.gait[self.columns] = self.people.gait
 
+    def _move_doors(self, tick: int) -> None:
+        """Makes walls of the doors that are shut since this tick of the recording, and openings of the others."""
+        walls = self.doors.walls()
+        self.walls = [*(row for row in self.walls if row[0] < tick), (tick, walls)]
+        self.obstacles = self.obstacles._replace(walls=walls.reshape(-1, 4))
+        for k, shut in enumerate(self.doors.shut.tolist()):
+            if shut and k not in self.shut:
+                self.shut[k] = _add_wall(self.space, self.scene.doors[k])
+            elif not shut and k in self.shut:
+                self.space.remove(self.shut.pop(k))
+
     def _come_and_go(self, t: float, first: bool) -> None:
         """Removes people who leave at time t (s, negative in the warm-up), and adds groups that enter."""
         if not len(self.columns) and not self.waiting:
@@ -195,7 +227,8 @@ class World:
         gone = self.groups.remove_leaving(self.columns)
         coming = [g for g in self.waiting if g.enter <= t or (first and g.enter == 0)]
         # A group waits while people stand at its place.
-        coming = [group for group in coming if first or self._has_room(group)]
+        shut = set() if first else {group.head for group in coming if not self._has_room(group)}
+        coming = [group for group in coming if group.head not in shut]
         if not gone and not coming:
             return
         for column in gone:
@@ -206,9 +239,13 @@ class World:
             self.groups.enter(group)
             heading = self.groups.arrays.heading[group.index]
             # A walking group starts back on its way if that is free, to be at its start when the recording begins.
-            back = group.pos - self.scenario.warmup * group.speed * heading
+            far = self.scenario.warmup * group.speed * heading
             early = first and group.enter == 0 and group.walks and not len(self.scene.pillars)
-            start = back if early and not blocked(group.pos, back, self.scene.walls).any() else group.pos
+            whole = (
+                np.concatenate([part.pos for part in self.entering if part.head == group.head]) if early else group.pos
+            )
+            back = early and not blocked(whole, whole - far, self.scene.walls).any()
+            start = group.pos - far if back else group.pos
             velocity = group.speed * heading if group.walks else heading * 0
             for member, pos in zip(group.members, start, strict=True):
                 self.bodies[member.column] = self._body(pos, velocity)
@@ -246,13 +283,15 @@ class World:
         self._read_buffer.clear()
         pymunk.batch.get_space_bodies(self.space, fields, self._read_buffer)
 
-    def _motion(self, ticks: Array, groups: Ints, state: Array, intent: Ints, frames: FrameTimes) -> Motion:
+    def _motion(
+        self, ticks: Array, groups: Ints, state: Array, intent: Ints, frames: FrameTimes, waiting: Bools | None
+    ) -> Motion:
         """Returns the Motion of states and group indices at the ticks, and in the frames."""
         height = np.array([m.height for m in self.members])
         pos, vel = ticks[..., :2], ticks[..., 2:]
         present = np.isfinite(pos[..., 0])
         facing = facings(pos, vel, present, groups, SCRIPT_RATE)
-        measured = States(SCRIPT_RATE, pos, vel, headings(facing), present, groups)
+        measured = States(SCRIPT_RATE, pos, vel, headings(facing), present, groups, tuple(self.walls), waiting)
         there = np.isfinite(state[..., 0])
         if self.between is None:
             # All frames lie on ticks.
@@ -269,14 +308,19 @@ class World:
         )  # fmt: skip
 
 
+def _add_wall(space: pymunk.Space, wall: Array) -> pymunk.Segment:
+    segment = pymunk.Segment(space.static_body, tuple(wall[0]), tuple(wall[1]), 0.02)
+    segment.friction = 0.0
+    space.add(segment)
+    return segment
+
+
 def _space(scene: Scene) -> pymunk.Space:
     space = pymunk.Space()
     space.collision_slop = 0.005
     space.collision_bias = OVERLAP_LEFT
     for wall in scene.walls:
-        segment = pymunk.Segment(space.static_body, tuple(wall[0]), tuple(wall[1]), 0.02)
-        segment.friction = 0.0
-        space.add(segment)
+        _add_wall(space, wall)
     for x, y, r in scene.pillars:
         pillar = pymunk.Circle(space.static_body, float(r), (float(x), float(y)))
         pillar.friction = 0.0

@@ -46,7 +46,8 @@ def truth_files(truth: Truth) -> dict[str, bytes]:
 
 def _table(truth: Truth) -> bytes:
     columns: tables.Columns = {
-        "frame": truth.frame, "id": truth.id, "group": truth.group, ("x", "y"): truth.pos, ("vx", "vy"): truth.vel,
+        "frame": truth.frame, "id": truth.id, "group": truth.group, "subgroup": truth.subgroup,
+        ("x", "y"): truth.pos, ("vx", "vy"): truth.vel,
         BOX: truth.box, VISIBLE: truth.visible_box, "visibility": truth.visibility, "z": truth.z,
         "heading": truth.heading, "height": truth.height, "truncation": truth.truncation,
     }  # fmt: skip
@@ -115,6 +116,7 @@ def read_truth(folder: Path) -> Truth:
     return Truth(
         name=facts.name, fps=facts.fps, length=length, px_per_m=tables.none_to_nan(facts.px_per_m),
         frame=frame, id=id, group=table.ints("group"),
+        subgroup=table.ints("subgroup") if "subgroup" in table.columns else None,
         pos=table.known("x", "y"), vel=table.known("vx", "vy"), box=table.known(*BOX),
         visible_box=table.known(*VISIBLE), visibility=table.floats("visibility"), z=table.known("z"),
         heading=table.known("heading"), height=table.known("height"), truncation=table.known("truncation"),

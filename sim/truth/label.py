@@ -16,7 +16,6 @@ from sim.clock import FrameTicks
 from sim.scene.body import Ellipsoids, Outlines, RecordedBodies, contour, outlines, recorded_bodies, recorded_things
 from sim.scene.camera import project, px_per_m_at_centre
 from sim.scene.visibility import measure_visibility
-from sim.stuck import Immobile
 from sim.truth.group_hulls import groups_in_hulls, groups_over_time
 from sim.truth.merge_split_events import GroupsAndEvents
 from sim.truth.motion_rows import MotionRows
@@ -75,10 +74,25 @@ def bodies(motion: Motion, camera: Camera | None, people: RecordedBodies | None 
     return Truth(
         name=motion.name, fps=motion.fps, length=len(motion.present),
         px_per_m=float("nan") if camera is None else px_per_m_at_centre(camera), frame=people.frame, id=people.id,
-        group=np.full(len(p), -1, np.int64), pos=motion.pos[t, p], vel=motion.vel[t, p],
+        group=np.full(len(p), -1, np.int64), subgroup=_subgroups(motion, t, p),
+        pos=motion.pos[t, p], vel=motion.vel[t, p],
         box=box, visibility=visibility, z=people.pos3[:, 2], heading=motion.heading[t, p], height=motion.height[p],
         truncation=truncation, visible_box=visible_box, orders=motion.orders,
     )  # fmt: skip
+
+
+def _subgroups(motion: Motion, t: Ints, p: Ints) -> Ints | None:
+    """Returns the number of the sub-group (R,), from 1 in the order of the script, of persons p in frames t.
+
+    -1 for a person without, or who is alone in it in this frame; None if no group has sub-groups. t, p (R,): from 0.
+    """
+    if motion.subgroup is None:
+        return None
+    own, people = motion.subgroup[t, p], np.zeros((len(motion.present), int(motion.subgroup.max(initial=0)) + 1), int)
+    inside = own >= 0
+    np.add.at(people, (t[inside], own[inside]), 1)
+    first = motion.subgroup[motion.subgroup >= 0].min(initial=len(people[0]))
+    return np.where(inside & (people[t, own] > 1), own - first + 1, -1)
 
 
 def label(motion: Motion, camera: Camera | None) -> Truth:
@@ -88,7 +102,8 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
     people = recorded_bodies(motion)
     truth = bodies(motion, camera, people)
     s = motion.states()
-    rows = replace(MotionRows.of_table(s.pos, s.vel, s.present, s.intent), walls=motion.scene.walls)
+    rows = MotionRows.of_table(s.pos, s.vel, s.present, s.intent)
+    rows = replace(rows, walls=s.walls or ((0, motion.scene.walls),))
     found, group = groups_and_events(rows, s.rate), np.full(s.present.shape, -1)
     group[rows.frame, rows.column] = found.group
     shown = FrameTicks.of(truth.length, motion.fps, s.rate, s.present)
@@ -96,7 +111,7 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
     assert truth.pos is not None
     assert truth.vel is not None
     ground = tuple(groups_over_time(truth.frame, truth.id, truth.group, truth.pos, truth.vel, 1, truth.length))
-    events, orders = _events_in_frames(_events(rows, found, s.rate, motion.immobile), motion, group, shown)
+    events, orders = _events_in_frames(_events(rows, found, s.rate, motion), motion, group, shown)
     return truth.replace(
         groups=ground, groups_px=None if camera is None else image_groups(truth, camera, people.shapes),
         labelled=np.ones(truth.length, dtype=np.bool_), events=events, near=_near_in_frames(found.near, shown),
@@ -104,18 +119,19 @@ def label(motion: Motion, camera: Camera | None) -> Truth:
     )  # fmt: skip
 
 
-def _events(rows: MotionRows, found: GroupsAndEvents, rate: float, immobile: tuple[Immobile, ...]) -> list[GroupEvent]:
+def _events(rows: MotionRows, found: GroupsAndEvents, rate: float, motion: Motion) -> list[GroupEvent]:
     from sim.truth.crossing_events import crossings
     from sim.truth.queue_detection import queues
 
     rows = replace(rows, group=found.group)
-    return [*found.events, *crossings(rows, rate), *queues(_moving(rows, immobile, rate), rate)]
+    return [*found.events, *crossings(rows, rate), *queues(_moving(rows, motion, rate), rate)]
 
 
-def _moving(rows: MotionRows, immobile: tuple[Immobile, ...], rate: float) -> MotionRows:
-    """Returns the rows without those of people who stand still on the way: who is stuck is in no queue."""
-    kept = np.ones(len(rows.frame), np.bool_)
-    for one in immobile:
+def _moving(rows: MotionRows, motion: Motion, rate: float) -> MotionRows:
+    """Returns the rows without those of people who are in no queue: who are stuck, or wait for a door to open."""
+    waiting = motion.states().waiting
+    kept = np.ones(len(rows.frame), np.bool_) if waiting is None else ~waiting[rows.frame, rows.column]
+    for one in motion.immobile:
         first, last = round(one.start * rate), round(one.end * rate)
         kept[int(rows.find(one.person - 1, first)) : int(rows.find(one.person - 1, last + 1))] = False
     if kept.all():

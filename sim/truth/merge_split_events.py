@@ -127,7 +127,7 @@ class _RuleTimes:
         end = min(int(self.motion.last(np.array(part)).max()) for part in (a, b)) + 1
         pos, vel, intent = self.motion.window(a + b, t, end)
         first, second = np.split(np.arange(len(a + b)), [len(a)])
-        found = separation(pos, vel, first, second, self.motion.walls)
+        found = separation(pos, vel, first, second, self.motion.walls, t)
         holds = found.merge_rule() if rule == "merge" else found.split_rule()
         # Everybody must be meant to be in one group, or in two.
         one, other = intent[:, first, None], intent[:, None, second]

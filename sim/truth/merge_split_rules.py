@@ -60,19 +60,25 @@ class Separation:
         return np.isfinite(self.distance) & ((self.distance > SPLIT_DISTANCE) | leaving)
 
 
-def separation(pos: Array, vel: Array, a: Ints, b: Ints, walls: Array | None = None) -> Separation:
+def separation(
+    pos: Array, vel: Array, a: Ints, b: Ints, walls: tuple[tuple[int, Array], ...] = (), first: int = 0
+) -> Separation:
     """Returns the Separation of two parts of a crowd, the people in columns a and those in columns b, in each frame.
 
-    pos, vel (T, P, 2): m, m/s, nan while absent. walls (W, 2, 2), m: the distance is that of walking round them; None:
-    there are none.
+    pos, vel (T, P, 2): m, m/s, nan while absent, from frame `first` on. walls: as of MotionRows; the distance is that
+    of walking round them.
     """
     gap = pos[:, a, None] - pos[:, None, b]
     gap2 = dot(gap, gap)
     gap2 = np.where(np.isnan(gap2), np.inf, gap2)
-    if walls is not None and len(walls):
+    for k, (since, there) in enumerate(walls):
+        if not len(there):
+            continue
+        until = walls[k + 1][0] if k + 1 < len(walls) else first + len(pos)
         near = gap2 < SPLIT_DISTANCE * SPLIT_DISTANCE
+        near[: max(since - first, 0)] = near[max(until - first, 0) :] = False
         t, i, j = np.nonzero(near)
-        way = distances_round(pos[t, a[i]], pos[t, b[j]], walls)
+        way = distances_round(pos[t, a[i]], pos[t, b[j]], there)
         gap2[near] = way * way
     gap2 = gap2.reshape(len(pos), -1).min(axis=1, initial=np.inf)
     difference = length(mean_of_present(vel[:, a]) - mean_of_present(vel[:, b]))

@@ -23,7 +23,8 @@ class MotionRows:
     vel: Array  # (R, 2): m/s, nan if unknown
     group: Ints  # (R,): group id, -1 = alone
     length: int  # frames T of the sequence
-    walls: Array | None = None  # (W, 2, 2): m, round which people walk; None: there are none
+    # round which people walk: (frame, walls (W, 2, 2) m since this frame), from frame 0 on; () without any
+    walls: tuple[tuple[int, Array], ...] = ()
     key: Ints = field(init=False)  # (R,): of person and frame, ascending
 
     def __post_init__(self) -> None:

@@ -41,8 +41,8 @@ def coco(
     """Writes the sequences of a source that have labelled boxes as a COCO file, or as several.
 
     Each frame is an image, each sequence a video, both numbered from 1. Annotations have bbox [left, top, width,
-    height] px (amodal, unclipped), area, iscrowd, track_id (the person's id), group_id (-1 for alone), visibility, and
-    with the stream ids a segmentation.
+    height] px (amodal, unclipped), area, iscrowd, track_id (the person's id), group_id (-1 for alone), subgroup_id of
+    scenes with sub-groups, visibility, and with the stream ids a segmentation.
 
     Args:
         source: A dataset of one split, or recordings.
@@ -146,9 +146,10 @@ def _annotations(labelled: LabelledPictures, index: int) -> Iterator[dict[str, A
         if people.ids is not None:
             mask = run_lengths(people.ids == person)
             shape = {"segmentation": {"size": [height, width], "counts": mask}, "area": sum(mask[1::2])}
+        own = {} if labelled.truth.subgroup is None else {"subgroup_id": int(labelled.truth.subgroup[people.rows[k]])}
         yield {
             "bbox": box, **shape, "iscrowd": int(people.ignored[k]), "track_id": person,
-            "group_id": int(people.group[k]), "visibility": round(float(people.visibility[k]), 3),
+            "group_id": int(people.group[k]), **own, "visibility": round(float(people.visibility[k]), 3),
         }  # fmt: skip
 
 

@@ -117,7 +117,7 @@ class _Rows:
     heading: Array | None  # (R,) rad, None: the direction of vel
     box: Array | None  # (R, 4) px
     score: Array | None
-    shares: Mapping[str, Array]  # visibility and truncation (R,), by name, those that are known
+    more: Mapping[str, Array | Ints]  # visibility, truncation and subgroup (R,), by name, those that are known
     groups: Series[Groups] | None  # of each listed frame; None: not labelled
     events: Series[GroupEvent]
     places: Places
@@ -163,11 +163,14 @@ def truth_tables(truth: Truth, places: Places = NOWHERE) -> TidyTables:
     if groups is not None and truth.labelled is not None and truth.labelled.any():
         listed = listed[truth.labelled]
         groups = tuple(groups[k - 1] for k in listed.tolist())
-    shares = {"visibility": None if truth.box is None else truth.visibility, "truncation": truth.truncation}
+    more = {
+        "visibility": None if truth.box is None else truth.visibility, "truncation": truth.truncation,
+        "subgroup": truth.subgroup,
+    }  # fmt: skip
     return _tables(
         _Rows(
             truth.fps, listed, unit, truth.frame, truth.id, truth.group, pos, vel, truth.heading, truth.box, None,
-            {name: share for name, share in shares.items() if share is not None}, groups, truth.events or (), places,
+            {name: values for name, values in more.items() if values is not None}, groups, truth.events or (), places,
         )
     )  # fmt: skip
 
@@ -250,7 +253,7 @@ def _tables(rows: _Rows) -> TidyTables:
     people |= {f"speed_{u}_s": speed, "heading_rad": heading}
     people |= {} if rows.box is None else {name: rows.box[:, k] for k, name in enumerate(BOX)}
     people |= {} if rows.score is None else {"score": rows.score}
-    people |= rows.shares
+    people |= rows.more
     people |= {} if rows.groups is None else {"group": rows.group}
     number, group, size, members = _group_rows(rows)
     return TidyTables(

@@ -8,7 +8,7 @@ The kinds of pieces, in the order in which they are tried (`STAGES` of `tracking
     obstacles     a door, wall, pillar, flight of stairs or service point
     difficulties  a key of sensor, light, picture, crowd or camera: set to its easiest value, else to its default
     people        a person of a group (of a drawn size first those above the least), a copy of a group with `repeat`
-    details       a stop or point on a group's way, a part of a split, a group of a merge or queue, a hidden time
+    details       a stop, a point of a way, a sub-group, a part of a split, a group of a merge or queue, a hidden time
 
 Keys that name a removed group or order are removed, too.
 """
@@ -20,7 +20,7 @@ import operator
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import reduce
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -29,10 +29,14 @@ from scenarios.loading.checks import check
 from scenarios.loading.toml_files import Table, dump
 from scenarios.loading.validation import validate
 from scenarios.reading import parse_toml
+from scenarios.schema.groups import GroupSpec, SubGroupSpec
 from scenarios.schema.scenario import Scenario, expand
 from scenarios.schema.values import Distribution, Value, bounds
 from sim.types import Array
 from tracking.running.truth_detections import PERFECT_SENSOR, SEES_ALL
+
+if TYPE_CHECKING:
+    from sim.crowd.population import EnteringGroup
 
 GONE: Any = object()
 EASIEST: Table = {
@@ -49,7 +53,7 @@ Path = tuple[str | int, ...]  # of a value in the table of a scenario
 Pattern = tuple[str | tuple[str, ...], ...]  # Paths: EACH stands for all elements of a list, a tuple for several keys.
 EACH = "*"
 DETAILS: tuple[Pattern, ...] = (
-    ("sensor", "hide", EACH), ("light", "switch", EACH), ("group", EACH, ("stops", "via"), EACH),
+    ("sensor", "hide", EACH), ("light", "switch", EACH), ("group", EACH, ("stops", "via", "groups"), EACH),
     ("event", EACH, "parts", EACH, "size"),  # before the part itself
     ("event", EACH, ("parts", "via", "groups"), EACH),
 )  # fmt: skip
@@ -244,12 +248,16 @@ def people(scenario: Scenario) -> list[Piece]:
     that is drawn is first set to its least value."""
     pieces = []
     for k, group in enumerate(scenario.group):
-        size = ("group", k, "size")
-        if isinstance(group.size, Distribution):
-            pieces.append(_set(_least(group.size), *size))
-        else:
-            pieces += [Piece(size, lambda now: round(now) - 1)] * (round(group.size) - 1)
-        pieces += [Piece(("group", k, "repeat"), lambda now: now - 1)] * (group.repeat - 1)
+        whole: list[tuple[Path, GroupSpec | SubGroupSpec]] = [(("group", k), group)]
+        parts = whole[1:] + [(("group", k, "groups", j), part) for j, part in enumerate(group.groups)]
+        for path, part in parts or whole:
+            size = (*path, "size")
+            if isinstance(part.size, Distribution):
+                pieces.append(_set(_least(part.size), *size))
+            else:
+                pieces += [Piece(size, lambda now: round(now) - 1)] * (round(part.size) - 1)
+        for path, part in parts + whole:
+            pieces += [Piece((*path, "repeat"), lambda now: now - 1)] * (part.repeat - 1)
     return pieces
 
 
@@ -295,7 +303,8 @@ def pinned(scenario: Scenario, seed: int, repeat: int = 0) -> Scenario | None:
     table["turn_deg"] = round(float(np.rad2deg(placed.turn)), DECIMALS)
     table["group"] = [
         {
-            "id": group.name, "size": len(group.members), "start": place(group.start), "goal": place(group.goal),
+            "id": group.name, **_people_of([part for part in drawn if part.head == group.index]),
+            "start": place(group.start), "goal": place(group.goal),
             "via": [place(point) for point in group.via], "speed": round(group.speed, DECIMALS),
             "enter": round(group.enter, DECIMALS), "at_goal": group.finish, "scatter": scatter[group.name],
             "stops": [
@@ -304,6 +313,15 @@ def pinned(scenario: Scenario, seed: int, repeat: int = 0) -> Scenario | None:
                     **({} if stop.whole else {"members": len(stop.members)}),
                 } for stop in group.stops
             ],
-        } for group in drawn
+        } for group in drawn if group.head == group.index
     ]  # fmt: skip
     return _valid(table)
+
+
+def _people_of(parts: list[EnteringGroup]) -> dict[str, Any]:
+    """Returns the keys of a drawn group that say who its people are. parts: its sub-groups, or itself."""
+    found = [{"size": len(part.members), "formation": "none" if part.flock else "rows"} for part in parts]
+    if not parts[0].part:
+        return found[0]
+    names = [part.part.removeprefix(f"{part.name}.") for part in parts]
+    return {"groups": [{"id": name} | own for name, own in zip(names, found, strict=True)]}

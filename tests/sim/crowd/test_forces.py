@@ -11,6 +11,7 @@ from sim.crowd.forces import (
     GROUP,
     MAX_ACCELERATION,
     MODE,
+    PROCESSION,
     QUEUE,
     SWAY_X,
     SWAY_Y,
@@ -30,7 +31,7 @@ def crowd(n: int, seed: int, side: float = 6.0) -> tuple[np.ndarray, PeopleArray
     r = np.random.default_rng(seed)
     state = np.concatenate([r.uniform(0, side, (n, 2)), r.normal(0, 1, (n, 2))], axis=1)
     people = PeopleArrays.empty(n)
-    people.tag[:, GROUP] = np.arange(n) // 3
+    people.tag[:, GROUP] = people.tag[:, PROCESSION] = np.arange(n) // 3
     people.tag[:, MODE] = 0
     people.tag[:, QUEUE] = np.where(r.random(n) < 0.2, 0, -1)
     people.place[:] = r.normal(0, 0.7, (n, 2))
@@ -74,6 +75,9 @@ def test_pairs_equal_the_slow_twin(arranged: str, n: int) -> None:
     out = np.zeros((n, 2))
     _pairs(state, people.tag, groups.boids, out)
     np.testing.assert_allclose(out, between_people(state, people.tag), atol=1e-9)
+    out[:], people.tag[:, PROCESSION] = 0, np.arange(n) // 9  # three groups behind each other
+    _pairs(state, people.tag, groups.boids, out)
+    np.testing.assert_allclose(out, between_people(state, people.tag), atol=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -84,8 +88,9 @@ def test_groups_equal_the_slow_twin(seed: int) -> None:
     now[:, 9] = (count > 0) & (r.random(40) < 0.9)
     now[seed, 3:5] = 0.0
     push = np.ones((40, 2))
-    _avoid_groups(now, push, r.permutation(40))
-    np.testing.assert_allclose(push, between_groups(now), atol=1e-9)
+    head = np.arange(40) // (1 + 9 * (seed % 2))  # each alone, or ten behind each other
+    _avoid_groups(now, push, r.permutation(40), head)
+    np.testing.assert_allclose(push, between_groups(now, head), atol=1e-9)
     assert np.abs(push).max() > 0.1
 
 

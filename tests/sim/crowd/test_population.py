@@ -9,7 +9,7 @@ import pytest
 
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
-from scenarios.schema.scenario import Stop
+from scenarios.schema.groups import Stop
 from sim.crowd.population import draw_stops
 from sim.crowd.world import run
 

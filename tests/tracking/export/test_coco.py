@@ -62,6 +62,18 @@ def test_parts_hold_what_one_file_holds(tmp_path):
         coco(tmp_path / "data", tmp_path / "other.json", part_size=0)
 
 
+def test_coco_has_sub_groups(tmp_path):
+    live = make_sequence(0)
+    truth = live.truth.replace(subgroup=np.arange(len(live.truth.id)))
+    sequence_folder.write_sequence(
+        tmp_path / "a", replace(live, load_truth=lambda: truth), scenario="schema = 1\n", seed=0
+    )
+    coco(tmp_path / "a", tmp_path / "coco.json")
+    found = {a["subgroup_id"]: a["track_id"] for a in json.loads((tmp_path / "coco.json").read_text())["annotations"]}
+    assert found
+    assert all(truth.id[row] == person for row, person in found.items())
+
+
 def stored(folder, sequence, seed=1, **options):
     return sequence_folder.write_sequence(folder, sequence, scenario="schema = 1\n", seed=seed, **options)
 

@@ -50,6 +50,13 @@ def rows(table) -> list[dict]:
     return table.to_arrow().to_pylist()
 
 
+def test_people_have_sub_groups_where_the_truth_has():
+    truth = make_sequence(0).truth
+    assert "subgroup" not in truth_tables(truth).people.columns
+    numbers = np.arange(len(truth.id))
+    assert truth_tables(truth.replace(subgroup=numbers)).people.columns["subgroup"].tolist() == numbers.tolist()
+
+
 def test_people_have_si_units():
     people = rows(run_tables(walk(), 2.0).people)
     assert people[2] == {

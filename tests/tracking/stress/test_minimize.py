@@ -14,7 +14,8 @@ import pytest
 from scenarios.errors import InputError, OrderError, WorkError
 from scenarios.loading.resolve import load
 from scenarios.loading.toml_files import dump
-from scenarios.schema.scenario import Scenario, group_names
+from scenarios.schema.groups import group_names
+from scenarios.schema.scenario import Scenario
 from scenarios.schema.values import bounds
 from tests.processes import FAKE
 from tests.refusals import answer, refused
@@ -26,7 +27,7 @@ from tracking.errors.people import PersonKind
 from tracking.scoring.catalogue import ALL, Score
 from tracking.stress.failures import Judgement, parse_failure, play_episode
 from tracking.stress.minimize import STAGES, Minimizer
-from tracking.stress.reductions import beginning, difficulties, pinned, script, without
+from tracking.stress.reductions import beginning, difficulties, people, pinned, script, without
 
 FAILURE = parse_failure("HOTA<0.5")
 Oracle = Callable[[Scenario, int], bool]
@@ -113,6 +114,19 @@ def test_the_drawn_groups_stay_where_they_are() -> None:
         for old, new in zip(before, after, strict=True):
             assert max(*abs(old.start - new.start), *abs(old.goal - new.goal)) < 0.011
             assert (old.enter, old.speed) == pytest.approx((new.enter, new.speed), abs=0.006)
+
+
+def test_a_drawn_group_keeps_its_sub_groups() -> None:
+    pair = "{ id = 'pair', size = { choice = [2, 3] }, formation = 'none', repeat = 6 }"
+    group = f"group.class={{ start = [4, 5], goal = [14, 5], groups = [{{ id = 'teacher', size = 1 }}, {pair}] }}"
+    fixed = pinned(load("cross", [group]), 5)
+    assert fixed is not None
+    made = fixed.group[-1]
+    assert [part.id for part in made.groups] == ["teacher", *(f"pair-{k}" for k in range(1, 7))]
+    assert {(part.size in (2, 3), part.formation) for part in made.groups[1:]} == {(True, "none")}
+    small = without(fixed, people(fixed))
+    assert small is not None
+    assert [part.size for part in small.group[-1].groups] == [1] * 7
 
 
 def test_a_later_beginning_moves_everything_by_a_second() -> None:
