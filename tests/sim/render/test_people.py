@@ -46,7 +46,7 @@ def slowly_seen(view: str) -> slow.Seen:
 @pytest.mark.parametrize("view", VIEWS)
 def test_ids_and_silhouettes_are_those_of_a_slow_renderer(view: str) -> None:
     motion, seen, pixels = dressed(), slowly_seen(view), Renderer(dressed(), VIEWS[view]).pixels(5)
-    assert (seen.ids > 0).sum() > 250
+    assert (seen.ids > 0).sum() > 200
     assert (seen.ids == -2).sum() > 150
     assert (pixels.ids != seen.ids).sum() <= 6  # a ray that grazes two things
     for k, person in enumerate(np.flatnonzero(motion.present[4]) + 1):
