@@ -44,7 +44,7 @@ class GroundKind(NamedTuple):
 GROUNDS = {
     "paving": GroundKind((140, 148, 156), (0.2, 0.7), 0.6, 0.2, 0.22, 0.0),
     "tiles": GroundKind((150, 160, 172), (0.25, 0.6), 1.0, 0.3, 0.1, 0.05),
-    "asphalt": GroundKind((96, 96, 96), (0.0, 0.0), 1.0, 0.0, 0.22, 0.0),
+    "asphalt": GroundKind((134, 134, 134), (0.0, 0.0), 1.0, 0.0, 0.22, 0.0),
     "concrete": GroundKind((158, 164, 166), (2.0, 4.0), 1.0, 0.07, 0.14, 0.0),
     "gravel": GroundKind((118, 142, 156), (0.0, 0.0), 1.0, 0.0, 0.4, 0.0),
     "grass": GroundKind((64, 112, 96), (0.0, 0.0), 1.0, 0.0, 0.45, 0.0),

@@ -148,7 +148,9 @@ def facade(along, z, key, footprint):  # type: ignore[no-untyped-def]
     if edge > 0.08 and u > 0.03:
         return kept * (-0.5 + 0.35 * lattice_value(int(i), int(j), key))
     if edge > 0.0:
-        return 0.2 * kept
+        return 0.35 * kept
+    if u > 0.5 * wide - 0.06 and lattice_value(int(np.floor(along / wide + 0.5)), 2, key + 1) > 0.3:
+        return 0.45 * lattice_value(4, 3, key) - 0.15  # downpipe
     return -0.12 * kept if z - j * high < 0.12 else 0.0
 
 
@@ -159,8 +161,9 @@ def poster(along, z, key):  # type: ignore[no-untyped-def]
     kind = lattice_value(int(i), 0, key)
     off = abs(along - (i + 0.5) * 4.1 - lattice_value(int(i), 1, key))
     low, top = (0.0, 2.05) if kind > 0.5 else (0.9, 1.6 + 0.6 * lattice_value(int(i), 4, key))
-    shown = kind > -0.1 and off < 0.45 + 0.2 * kind and low <= z < top
-    return shown, 0.6 * lattice_value(int(i), 2, key), 0.35 * lattice_value(int(i), 3, key)
+    inside = min(0.45 + 0.2 * kind - off, top - z)  # m inside the frame's outer edge
+    shown, light = kind > -0.1 and inside > 0.0 and z >= low, 0.6 * lattice_value(int(i), 2, key)
+    return shown, -0.4 * light if inside < 0.07 else light, 0.35 * lattice_value(int(i), 3, key)
 
 
 @njit(cache=True)

@@ -3,9 +3,10 @@
 All parts of a shape stand in its own axes, across (to the right), along its heading and up, from the place on the
 ground. A part is turned only by its pitch, about the axis across: at a positive pitch its lower end is ahead.
 
-The gait: a leg has phase p, the other one p + pi. The thigh has the pitch swing (STEP cos p + LEAN), and the knee is
-bent by swing (BENT + KNEE max(0, -sin p)²), most while the thigh moves forwards. The arm of a side moves against its
-leg. The hip sinks until the lower foot is on the ground. swing is 0 for a person who stands and 1 at 1.4 m/s.
+The gait: a leg has phase p, the other one p + pi. The thigh has the pitch STANCE cos p + swing (STEP cos p + LEAN), and
+the knee is bent by swing (BENT + KNEE max(0, -sin p)²), most while the thigh moves forwards. The arm of a side moves
+against its leg, its elbow bent by ELBOW. The hip sinks until the lower foot is on the ground. swing is 0 for a person
+who stands and 1 at 1.4 m/s. Boxes are as wide as those of real people seen from afar: 0.27 to 0.44 of their height.
 """
 
 from __future__ import annotations
@@ -19,17 +20,18 @@ from sim.types import Array, Bools, Ints
 
 # Lengths, and heights of ankle and shoulder; shares of the person's height.
 THIGH, SHIN, ANKLE, SHOULDER = 0.245, 0.225, 0.045, 0.79
-STEP, LEAN, BENT, KNEE = 0.44, 0.05, 0.1, 0.95  # rad, of the gait
+STEP, LEAN, BENT, KNEE = 0.21, 0.04, 0.1, 0.8  # rad, of the gait
+STANCE, ELBOW = 0.14, 0.42  # rad: of the legs when standing, and of the forearms
 HEAD_SHARE = 0.93  # height of the head's centre, share of the person's height
 SIDES = np.array([-1.0, 1.0])  # left, right
 
 # Upright parts of the trunk, one row each: centre along and up, then half axes across, along and up; shares of height.
 TRUNK = np.array(
     [
-        [0.0, 0.67, 0.110, 0.078, 0.19],  # torso
+        [0.0, 0.67, 0.112, 0.096, 0.19],  # torso
         [0.005, HEAD_SHARE, 0.045, 0.057, 0.07],  # head
-        [0.0, 0.795, 0.125, 0.055, 0.05],  # shoulders
-        [0.0, 0.52, 0.098, 0.074, 0.10],  # hips
+        [0.0, 0.795, 0.130, 0.064, 0.05],  # shoulders
+        [0.0, 0.52, 0.102, 0.086, 0.10],  # hips
         [0.0, 0.865, 0.032, 0.036, 0.045],  # neck
     ]
 )
@@ -38,9 +40,9 @@ LIMBS = np.array(
     [
         [0.054, 0.060, 0.160],  # thighs
         [0.040, 0.044, 0.150],  # shins
-        [0.026, 0.068, 0.025],  # feet
-        [0.033, 0.036, 0.110],  # upper arms
-        [0.027, 0.029, 0.130],  # forearms with hands
+        [0.028, 0.076, 0.026],  # feet
+        [0.034, 0.040, 0.110],  # upper arms
+        [0.029, 0.032, 0.130],  # forearms with hands
     ]
 )
 LIMB_PARTS = len(TRUNK) + 2 * len(LIMBS)
@@ -49,7 +51,7 @@ WORN = ("coat", "bag", "rucksack", "hat")
 # Rows of WORN: centre across, along, up, half axes; shares of height.
 WORN_SHAPES = np.array(
     [
-        [0.0, 0.0, 0.49, 0.118, 0.096, 0.21],
+        [0.0, 0.0, 0.49, 0.128, 0.112, 0.21],
         [0.165, 0.01, 0.46, 0.035, 0.095, 0.075],
         [0.0, -0.115, 0.70, 0.085, 0.062, 0.125],
         [0.0, 0.008, 0.975, 0.060, 0.078, 0.028],
@@ -154,11 +156,11 @@ def limbs(height: Array, width: Array, depth: Array, phase: Array, swing: Array)
     height, width, depth (N,): m. phase (N,): of the gait, rad. swing (N,): 0 standing, 1 at 1.4 m/s.
     """
     leg, beat = phase[:, None] + np.array([0.0, np.pi]), swing[:, None]
-    thigh = beat * (STEP * cos(leg) + LEAN)
+    thigh = (STANCE + beat * STEP) * cos(leg) + beat * LEAN
     back = np.maximum(-sin(leg), 0.0)
     shin = thigh - beat * (BENT + KNEE * back * back)
-    arm = -0.9 * thigh
-    forearm = arm + 0.12 + 0.35 * beat
+    arm = -0.7 * thigh
+    forearm = arm + ELBOW
     toe = 0.7 * shin  # pitch of the foot
 
     def joint(along: Array, up: Array, reach: float, pitch: Array) -> tuple[Array, Array]:
@@ -183,7 +185,7 @@ def limbs(height: Array, width: Array, depth: Array, phase: Array, swing: Array)
     half[:, [0, 2, 3], 1] *= deep
     for k, (along, up) in enumerate(centres):
         at = slice(trunk + 2 * k, trunk + 2 * k + 2)
-        offset[:, at, 0] = SIDES * (0.052 if k < 3 else 0.125 * broad + 0.006 * (k - 3))
+        offset[:, at, 0] = SIDES * (0.052 if k < 3 else 0.127 * broad + 0.010 * (k - 3))
         offset[:, at, 1], offset[:, at, 2], half[:, at] = along, up, LIMBS[k]
         pitch[:, at] = (thigh, shin, toe, arm, forearm)[k]
     offset[..., 2] -= sole.min(axis=1)[:, None]

@@ -10,6 +10,7 @@ from scenarios.schema.pictures import Light, Picture
 from sim.hashing import canonical_hash
 from sim.render.camera_view import blur_weights
 from sim.render.renderer import Renderer
+from sim.render.texture_kernels import facade, lattice_value, poster
 from sim.scene.raycast import GROUND, NOTHING, WALL
 from sim.types import Array, Scene
 from tests.reference_sense import above, crowd, pinhole, small
@@ -96,6 +97,27 @@ def test_a_ground_without_grass_is_the_same_everywhere() -> None:
     lawns, bare = ([spread(f"n{k}", grass) for k in range(8)] for grass in (True, False))
     assert max(bare) < 0.02
     assert sum(one > 0.1 for one in lawns) > 3
+
+
+def test_doors_and_posters_have_frames_of_the_other_brightness() -> None:
+    shown, light, _ = np.transpose([poster(x, 0.91, 7) for x in np.arange(0, 48 * 4.1, 0.01)])
+    runs = np.add(np.flatnonzero(np.diff(shown)).reshape(-1, 2), [1, 0])  # first and last place of each
+    assert len(runs) > 15
+    for first, last in runs:
+        middle = light[(first + last) // 2]
+        assert abs(middle) > 0
+        assert light[[first, first + 6, last - 6, last]] == pytest.approx(-0.4 * middle)
+        assert light[[first + 8, last - 8]] == pytest.approx(middle)
+
+
+def test_downpipes_stand_between_the_windows_of_facades() -> None:
+    light = np.array([facade(x, 4.2, 7, 0.01) for x in np.arange(0.5, 200, 0.01)])
+    pipe = light == 0.45 * lattice_value(4, 3, 7) - 0.15
+    runs = np.flatnonzero(np.diff(pipe)).reshape(-1, 2)
+    assert len(runs) > 10
+    assert np.diff(runs) * 0.01 == pytest.approx(0.12, abs=0.011)
+    wide = 2.6 + lattice_value(0, 3, 7)
+    assert ((0.5 + 0.01 * runs.mean(axis=1)) / wide + 0.5) % 1 == pytest.approx(0.5, abs=0.01)
 
 
 def test_materials_differ_more_with_more_variety() -> None:

@@ -33,9 +33,19 @@ def test_the_lower_foot_is_on_the_ground_and_the_head_is_nearly_at_the_height(ph
     assert 1.7 - 0.12 < top < 1.7 + 0.01
 
 
-def test_legs_are_closed_when_standing_and_apart_by_a_step_when_walking() -> None:
-    assert np.ptp(person(1.0, 0.0).offset[0, FEET, 1]) == 0
+def test_feet_are_apart_by_half_a_step_at_most_when_standing_and_by_a_step_when_walking() -> None:
+    for phase, share in ((0.0, 1.0), (1.0, np.cos(1.0))):
+        assert np.ptp(person(phase, 0.0).offset[0, FEET, 1]) == pytest.approx(0.23 * share, abs=0.02)
     assert 0.5 < np.ptp(person(0.0, 1.0).offset[0, FEET, 1]) < 0.8  # m, of a person of 1.7 m
+
+
+@pytest.mark.parametrize("swing", [0.0, 1.0])
+def test_boxes_of_people_seen_from_the_side_are_neither_sticks_nor_splits(swing: float) -> None:
+    """Labels of people in PETS09-S2L1 are 0.29 to 0.41 of their height wide (5 to 95 %), with a margin at each side."""
+    for phase in np.linspace(0, 2 * np.pi, 9):
+        shapes = placed(np.zeros((1, 3)), np.zeros(1), person(phase, swing))  # along x
+        half, x = np.sqrt(shapes.shape[..., 0, 0]), shapes.centre[..., 0]
+        assert 0.2 < np.ptp([x - half, x + half]) / 1.7 < 0.5
 
 
 def test_half_a_stride_later_left_and_right_are_exchanged() -> None:
