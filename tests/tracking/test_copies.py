@@ -25,7 +25,7 @@ PICTURES = [
 def sequence(mode):
     if mode == "file":
         return simulate(load("mixed", ["camera.fps=5"]), 40_001, 0, ())
-    return simulate(load("cross", PICTURES), 3, 0, ("left", "right", "background"))
+    return simulate(load("cross", PICTURES), 4, 0, ("left", "right", "background"))
 
 
 def content(t):

@@ -107,7 +107,7 @@ def test_a_beginning_is_scored_as_if_it_were_all() -> None:
 
 def test_a_beginning_is_not_told_what_comes_later() -> None:
     """Groups that are derived for scoring (a crossing is known 2 s after it) do not look beyond the frames scored."""
-    true = simulate(load("cross"), 0).truth
+    true = simulate(load("cross"), 1).truth
     (crossing,) = (e for e in true.events if e.kind == "cross")
     alone = [np.full(len(true.at(index).id), -1) for index in range(1, true.length + 1)]
     bare = [
