@@ -341,7 +341,8 @@ class Renderer:
         if self.light.rain > 0:
             from sim.render.air_kernels import draw_rain
 
-            drops = rain_drops(self.light.rain, view.camera.image, self._look, view.side, number)
+            level = abs(view.camera.rotation[1, 2])
+            drops = rain_drops(self.light.rain, view.camera.image, level, self._look, view.side, number)
             draw_rain(drops, self._materials[0][SKY], canvas, self._margin)
         gain = np.float32((self.picture.right_gain if view.side else 1.0) * self.light.level * contrast)
         lift = np.float32((1 - contrast) * MID_GREY * UNIT)
