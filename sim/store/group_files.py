@@ -107,6 +107,7 @@ def read_immobile(folder: Path) -> tuple[Immobile, ...]:
 
 def stands_in(folder: Path) -> dict[str, list[str]]:
     """Returns sentences on the groups of a sequence folder that never arrive, and on its people who stood still."""
+    found: dict[str, tuple[NeverArrives | Immobile, ...]]
     found = {"group": read_never_arrives(folder), "person": read_immobile(folder)}
     return {what: [one.words for one in some] for what, some in found.items() if some}
 
