@@ -74,6 +74,12 @@ def _check_world(scenario: Scenario) -> None:
     for k, stairs in enumerate(world.stairs):
         if stairs.foot == stairs.head:
             fail(f"world.stairs.{k}", "foot and head at one place", "two different places", "move one of them")
+    for k, box in enumerate(world.boxes or ()):
+        tilt = math.radians(box.tilt_deg)
+        top = box.at[2] + (abs(math.sin(tilt)) * box.size[1] + math.cos(tilt) * box.size[2]) / 2
+        if top <= 0:
+            got = f"a box whose top is {-top:g} m below the ground"
+            fail(f"world.boxes.{k}.at.2", got, "a part of it above the ground", "raise its middle")
 
 
 def _check_groups(scenario: Scenario) -> None:

@@ -27,7 +27,7 @@ from sim.dataset.splits import TUNING_SPLITS, is_real, split_of
 from sim.draws import drawn
 from sim.store import packs, sequence_folder
 from sim.store.atomic import PARTIAL, lock_folder, remove_partials, write_file
-from sim.store.group_files import read_immobile, read_never_arrives, warn_of
+from sim.store.group_files import stands_in, warn_of
 from sim.store.own_files import is_side_file, output_path, output_paths
 from sim.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest, reject_runs
 from sim.streams import check_streams
@@ -209,9 +209,9 @@ def run_shard(job: ShardJob) -> JobOutcome:
         if stored is not None and stored[0].issuperset(job.seeds):
             with suppress(InputError):  # damaged: it is made anew
                 packs.check_shard(job.path)
-                return JobOutcome(left_out=stored[1])
+                return JobOutcome(left_out=_wanted(job, stored[1]))
         seeds = sorted({*job.seeds, *(stored[0] if stored else ())})
-        facts = {**job.facts, "seeds": seeds, "left_out": {}}
+        facts = {**job.facts, "seeds": seeds, "left_out": {}, "stands": {}}
         with packs.new_shard(job.path, job.path.parents[1].name.removeprefix(SPLIT), facts) as (shard, folder):
             for one in (job.job(folder, seed) for seed in seeds):
                 try:
@@ -220,12 +220,19 @@ def run_shard(job: ShardJob) -> JobOutcome:
                     left_out[one.name] = error
                     facts["left_out"][one.name] = error.as_dict()
                     continue
+                if stands := stands_in(one.folder):
+                    facts["stands"][one.name] = stands
                 shard.add(one.folder)
                 shutil.rmtree(one.folder)
     except FlockscopeError as error:
         fatal = isinstance(error.__cause__, OSError)
         return JobOutcome(error, fatal)
-    return JobOutcome(left_out=left_out)
+    return JobOutcome(left_out=_wanted(job, left_out))
+
+
+def _wanted(job: ShardJob, left_out: dict[str, OrderError]) -> dict[str, OrderError]:
+    """Returns the sequences of the job's own seeds: a stored shard can have more."""
+    return {name: error for name, error in left_out.items() if int(name.rpartition("-s")[2]) in job.seeds}
 
 
 def lost_job(job: SequenceJob | ShardJob, error: WorkError) -> JobOutcome:
@@ -321,9 +328,14 @@ def generate(
             errors["seqmaps"] = error
     unfulfilled = _left_out(errors, len(jobs))
     made = Folders((job.folder for job in jobs if job.name not in unfulfilled), unfulfilled)
-    warn_of(read_never_arrives, made, "group")
-    warn_of(read_immobile, made, "person", "people")
+    _warn_of_who_stands((path.name, stands_in(path)) for path in made)
     return made
+
+
+def _warn_of_who_stands(stands: Iterable[tuple[str, dict[str, list[str]]]]) -> None:
+    found = list(stands)
+    for what in ("group", "person"):
+        warn_of(what, found)
 
 
 def _left_out(errors: dict[str, FlockscopeError], total: int) -> dict[str, OrderError]:
@@ -355,7 +367,9 @@ def _generate_shards(
         errors = _run_jobs(jobs, workers, progress, root, run_shard)
         if packs.shards_in(folder):
             packs.write_index(folder)
-    return Folders((job.path for job in jobs), _left_out(errors, len(entries) * len(seeds)))
+    made = Folders((job.path for job in jobs), _left_out(errors, len(entries) * len(seeds)))
+    _warn_of_who_stands(one for path in made for one in packs.read_seal(path).facts["stands"].items())
+    return made
 
 
 @contextmanager

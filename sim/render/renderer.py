@@ -339,10 +339,12 @@ class Renderer:
         image = np.empty((view.height, view.width, 3), np.uint8)
         number, contrast = index + BACKGROUNDS, self.picture.contrast
         if self.light.rain > 0:
-            from sim.render.air_kernels import draw_rain
+            from sim.render.air_kernels import draw_rain, night
 
-            drops = rain_drops(self.light.rain, view.camera.image, self._look, view.side, number)
-            draw_rain(drops, self._materials[0][SKY], canvas, self._margin)
+            palette, style = self._materials
+            level = abs(view.camera.rotation[1, 2])
+            drops = rain_drops(self.light.rain, view.camera.image, level, self._look, view.side, number)
+            draw_rain(drops, palette[SKY] * night(style), canvas, self._margin)
         gain = np.float32((self.picture.right_gain if view.side else 1.0) * self.light.level * contrast)
         lift = np.float32((1 - contrast) * MID_GREY * UNIT)
         bright = view.brightness(self._time(index), number) * gain

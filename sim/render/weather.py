@@ -143,16 +143,19 @@ RAIN_SLANT = 0.15  # px to the right per px downwards: standard deviation betwee
 RAIN_SHARES, RAIN_LENGTHS = (0.08, 0.3), (0.02, 0.07)  # of the sky's colour in a streak; of the picture's height
 
 
-def rain_drops(rain: float, size: tuple[int, int], look: tuple[int, int], side: int, frame: int) -> Array:
+def rain_drops(rain: float, size: tuple[int, int], level: float, look: tuple[int, int], side: int, frame: int) -> Array:
     """Returns the streaks of one picture for `air_kernels.draw_rain`, (N, 5). rain: streaks in 10,000 px.
 
-    size: width and height, px. look: look seed and repeat. side, frame: as of `camera_view.noise_offsets`.
+    size: width and height, px. level: cosine of the camera's tilt, 0 from above, where each drop is a dot. look:
+    look seed and repeat. side, frame: as of `camera_view.noise_offsets`.
     """
     seed, repeat = look
     wind = RAIN_SLANT * rng(seed, "light", RAIN, repeat=repeat).normal()
     source = rng(seed, "light", RAIN, side, frame, repeat=repeat)
     many = source.poisson(rain * size[0] * size[1] / 1e4)
-    low, high = np.transpose([RAIN_SHARES, np.array(RAIN_LENGTHS) * size[1], (0, 0), (-0.1, 1), (-0.1, 1)])
+    low, high = np.transpose(
+        [RAIN_SHARES, np.maximum(level * size[1] * np.array(RAIN_LENGTHS), 1), (0, 0), (-0.1, 1), (-0.1, 1)]
+    )
     drops = source.uniform(low, high, (many, 5))
     drops[:, 2] = wind + RAIN_SLANT / 5 * source.normal(size=many)
     return np.asarray(drops)

@@ -12,7 +12,7 @@ import csv
 import io
 import re
 import warnings
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from collections.abc import Sequence as Series
 from itertools import zip_longest
 from pathlib import Path
@@ -105,13 +105,21 @@ def read_immobile(folder: Path) -> tuple[Immobile, ...]:
     return tables.read_values(path, "restore it", people=tuple[Immobile, ...]).people if is_present(path) else ()
 
 
-def warn_of(read: Callable[[Path], tuple[NeverArrives | Immobile, ...]], folders: Iterable[Path], *what: str) -> None:
-    """Warns once of all that `read` finds in sequence folders. what: it in words, singular and plural."""
-    found = [(folder.name, one) for folder in folders for one in read(folder)]
+def stands_in(folder: Path) -> dict[str, list[str]]:
+    """Returns sentences on the groups of a sequence folder that never arrive, and on its people who stood still."""
+    found: dict[str, tuple[NeverArrives | Immobile, ...]]
+    found = {"group": read_never_arrives(folder), "person": read_immobile(folder)}
+    return {what: [one.words for one in some] for what, some in found.items() if some}
+
+
+def warn_of(what: str, stands: Iterable[tuple[str, dict[str, list[str]]]]) -> None:
+    """Warns once of all of one kind, "group" or "person", in sequences. stands: name and `stands_in` of each."""
+    found = [(name, words) for name, some in stands for words in some.get(what, ())]
     if found:
         (name, first), sequences = found[0], len({name for name, _ in found})
-        more = f"; {counted(len(found), *what)} in {counted(sequences, 'sequence')}" if len(found) > 1 else ""
-        warnings.warn(f"{name}: {first.words}{more}", stacklevel=3)
+        many = counted(len(found), what, "people" if what == "person" else "groups")
+        more = f"; {many} in {counted(sequences, 'sequence')}" if len(found) > 1 else ""
+        warnings.warn(f"{name}: {first}{more}", stacklevel=3)
 
 
 CSV_COLUMNS = ("frame", "group", "members", "x", "y", "hull", "size")

@@ -15,7 +15,7 @@ from scenarios.errors import FlockscopeError, InputError
 from sim import hashing
 from sim.store import packs, seal
 from sim.store.atomic import PARTIAL
-from sim.store.group_files import read_immobile, read_never_arrives, warn_of
+from sim.store.group_files import read_never_arrives, stands_in, warn_of
 from sim.store.own_files import is_side_file, split_and_name
 from sim.store.seal import is_run, read_run, run_problems
 from sim.store.track_files import read_run as read_run_tracks
@@ -102,7 +102,7 @@ def _shard_faults(tar: Path) -> Iterator[FlockscopeError]:
 
 def _other_faults(folder: Path, manifest: dict[str, Any]) -> Iterator[InputError]:
     lost = read_never_arrives(folder)
-    warn_of(read_immobile, [folder], "person", "people")
+    warn_of("person", [(folder.name, stands_in(folder))])
     named = {seal.MANIFEST, *manifest["files"]}
     for path in sorted(folder.rglob("*")):
         inside = path.relative_to(folder)

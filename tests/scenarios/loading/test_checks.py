@@ -46,6 +46,7 @@ WRONG = [
     ),
     (["world.doors=[{at=[4, 5]}]"], "world.doors.0", "no wall"),
     (["world.walls=[[1, 1, 1, 1]]"], "world.walls.0", "no length"),
+    (["world.boxes=[{ at = [1, 1, -2], size = [1, 1, 1] }]"], "world.boxes.0.at.2", "1.5 m below the ground"),
     (["world.stairs=[{foot=[1, 1], head=[1, 1]}]"], "world.stairs.0", "one place"),
     (["group.w.size=0"], "group.w.size", "0"),
     (["group.w.size={normal=[3, 1]}"], "group.w.size", "any number"),

@@ -112,6 +112,8 @@ def test_generate_and_validate_say_it_and_the_remedy_helps(tmp_path: Path, capsy
     err = capsys.readouterr().err
     assert "warning: s-s00000: group a never arrives: " in err
     assert "2 groups in 2 sequences" in err
+    assert run([*made, f"{tmp_path}/packed", "--pack", str(bad)]) == 0
+    assert capsys.readouterr().err.splitlines()[-2:] == err.splitlines()[-2:]
     assert run(["validate", f"{tmp_path}/bad", "--json"]) == 1
     out, err = capsys.readouterr()
     assert "warning: s-s00001: person 1 stood still for " in err

@@ -157,6 +157,7 @@ def test_what_fails_is_named_and_what_is_left_out_is_known_again(
     for _ in range(2):
         made = generate([Entry("x", scenario())], range(25), tmp_path, pack=True, streams=())
         assert list(made.left_out) == ["x-s00007"]
+    assert generate([Entry("x", scenario())], range(2), tmp_path, pack=True, streams=()).left_out == {}
     assert asked == list(range(25))
     assert len(open_source(tmp_path)) == 24
     with pytest.raises(WorkError, match="x-s00130"):

@@ -11,6 +11,7 @@ from sim.hashing import canonical_hash
 from sim.render.camera_view import blur_weights
 from sim.render.renderer import Renderer
 from sim.render.texture_kernels import facade, lattice_value, poster
+from sim.render.weather import rain_drops
 from sim.scene.raycast import GROUND, NOTHING, WALL
 from sim.types import Array, Scene
 from tests.reference_sense import above, crowd, pinhole, small
@@ -231,6 +232,12 @@ def test_rain_falls_anew_in_each_frame() -> None:
     assert (a & b).sum() < 0.3 * a.sum()
     dark = grey(PLAIN.background(3)) < 200
     assert (grey(wet.background(3)) - grey(PLAIN.background(3)))[a & dark].min() > -1
+
+
+def test_rain_seen_from_above_is_dots() -> None:
+    lengths = [rain_drops(20.0, (640, 480), level, (1, 1), 0, 3)[:, 1] for level in (1.0, 0.5, 0.0)]
+    assert np.allclose(lengths[1], lengths[0] / 2)
+    assert (lengths[2] == 1).all()
 
 
 def test_a_wet_ground_is_dark_below_and_mirrors_the_sky_afar() -> None:
