@@ -33,6 +33,12 @@ def signed(cell: str) -> str:
     return f"{float(number(cell, 3)):+.2f}{' *' * cell.endswith('*')}".replace("-", "−")
 
 
+def link(page: str, *tables: str) -> str:
+    """Returns the link to the page with the tables; it says if one of them is older than the code."""
+    older = any(results.is_stale(results.tables()[table]) for table in tables)
+    return f"([table]({page}){results.OLDER if older else ''})"
+
+
 def comparisons(docs: str = "docs/") -> str:
     """People, groups and speed beside other software. docs: the folder of the docs, from the page."""
     return "\n".join([_people(), _groups(), _speed()]).replace("](docs/", f"]({docs}")
@@ -56,7 +62,7 @@ def _people() -> str:
         f" {number(ours['HOTA'])}, the best of {count} trackers of other libraries ({best['tracker']})"
         f" {number(best['HOTA'])}; group F1 (people in the right groups) {number(ours['group_F1'])} and"
         f" {number(best['group_F1'])}. HOTA of both from boxes of recordings: {listed}"
-        " ([table](docs/results/trackers.md#beside-other-trackers))."
+        f" {link('docs/results/trackers.md#beside-other-trackers', 'peers')}."
     )
 
 
@@ -69,7 +75,7 @@ def _groups() -> str:
     )
     return (
         f"- **Groups**: who walks with whom, from people's positions, pairwise F1 on two recordings: {listed};"
-        " SPENCER is the other open tool for this ([table](docs/results/belonging.md))."
+        f" SPENCER is the other open tool for this {link('docs/results/belonging.md', 'belonging-recordings')}."
     )
 
 
@@ -86,7 +92,7 @@ def _speed() -> str:
         f"- **Speed**: the simulator makes {min(ratios)} to {max(ratios)} times as many steps a CPU second as"
         f" JuPedSim, with {simulated[0]['people']} to {simulated[-1]['people']} people;"
         " HOTA, CLEAR and Identity equal TrackEval's and"
-        f" take a {number(faster, 0)}th of its time ([table](docs/results/cost.md))."
+        f" take a {number(faster, 0)}th of its time {link('docs/results/cost.md', 'simulator', 'scoring')}."
     )
 
 
@@ -97,7 +103,6 @@ def tuning() -> str:
     return (
         f"What it earns: a nearest-neighbour tracker gains HOTA {scenes} on scenes like two recordings, and {real} on"
         " the recordings themselves; `blob`, whose defaults are tuned already, there"
-        f" {' and '.join(signed(row[4]) for row in blob)}"
-        " ([table](docs/results/trackers.md#does-tuning-on-simulated-scenes-help-on-recordings); a star: the 95 %"
-        " interval does not hold 0)."
+        f" {' and '.join(signed(row[4]) for row in blob)}; a star: the 95 % interval does not hold 0"
+        f" {link('docs/results/trackers.md#does-tuning-on-simulated-scenes-help-on-recordings', 'tuning')}."
     )
