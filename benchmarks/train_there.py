@@ -110,7 +110,7 @@ def training_sets(
     return found
 
 
-def main() -> int:
+def main() -> None:
     parser = new_parser(__doc__)
     parser.add_argument("--peer-python", required=True, help="interpreter with torch, opencv-python-headless < 5")
     parser.add_argument("--from", nargs="+", default=["standard"], metavar="SUITE", dest="suites", help="or scenarios")
@@ -138,8 +138,7 @@ def main() -> int:
             with np.load(out) as found:
                 values = np.array([average_precision(truth, ignored, found[str(k)]) for k in range(len(jobs))])
             row([name, *map(mean_cell, values.reshape(len(args.detectors), -1))])
-    return 0
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    main()

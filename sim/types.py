@@ -222,8 +222,8 @@ class States(Frozen):
 
     pos, vel (C, P, 2): m, m/s; heading (C, P): rad; present (C, P); intent (C, P): number of the group that the script
     assigns the person to. walls: (tick, walls (W, 2, 2) m since this tick) from tick 0 on, shut doors included; ():
-    those of the scene. waiting (C, P): True for people on the way to a door that
-    is shut; None: there is none. A simulated crowd has the ticks of its script, whatever the camera's frame rate."""
+    those of the scene. waiting (C, P): True for people on the way to a door that is shut; None: there is none. A
+    simulated crowd has the ticks of its script, whatever the camera's frame rate."""
 
     rate: float
     pos: Array

@@ -36,6 +36,13 @@ HALF_WALL = 0.02  # m, as in ours
 LOOK = 0.4  # s between two looks at who stands still
 
 
+def ground_of(plan):
+    """Returns the world of a plan without its walls and pillars."""
+    parts = [shapely.LineString([w[:2], w[2:]]).buffer(HALF_WALL, cap_style="flat") for w in plan["walls"]]
+    parts += [shapely.Point(x, y).buffer(r, 6) for x, y, r in plan.get("pillars", ())]
+    return shapely.box(0, 0, *plan["size"]).difference(unary_union(parts))
+
+
 def agent_of(model, ways, person):
     """Returns a person as an agent. ways: stage and journey of each goal."""
     _, parameters, speed = MODELS[model]
@@ -49,9 +56,7 @@ def agent_of(model, ways, person):
 
 def played(given, plan):
     model = MODELS[given["model"]][0]
-    parts = [shapely.LineString([w[:2], w[2:]]).buffer(HALF_WALL, cap_style="flat") for w in plan["walls"]]
-    parts += [shapely.Point(x, y).buffer(r, 6) for x, y, r in plan["pillars"]]
-    ground = shapely.box(0, 0, *plan["size"]).difference(unary_union(parts))
+    ground = ground_of(plan)
     begin = time.process_time()
     simulation = jps.Simulation(model=model(), geometry=ground, dt=given["dt"])
     ways = {}

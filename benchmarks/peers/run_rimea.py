@@ -14,19 +14,17 @@ import sys
 import jupedsim as jps
 import numpy as np
 import shapely
-from run_floor_plans import HALF_WALL, MODELS, agent_of
+from run_floor_plans import MODELS, agent_of, ground_of
 
 
-def ground_of(plan):
-    walls = [shapely.LineString([w[:2], w[2:]]).buffer(HALF_WALL, cap_style="flat") for w in plan["walls"]]
-    ground = shapely.box(0, 0, *plan["size"]).difference(shapely.union_all(walls))
-    start = shapely.Point(plan["people"][0]["start"])
+def part_with_people(plan):
+    ground, start = ground_of(plan), shapely.Point(plan["people"][0]["start"])
     return next(part for part in getattr(ground, "geoms", [ground]) if part.contains(start))
 
 
 def paths(given, plan):
     model = MODELS[given["model"]][0]
-    simulation = jps.Simulation(model=model(), geometry=ground_of(plan), dt=given["dt"])
+    simulation = jps.Simulation(model=model(), geometry=part_with_people(plan), dt=given["dt"])
     ways, numbers, coming = {}, {}, dict(enumerate(plan["people"]))
     for x, y in {tuple(person["goal"]) for person in plan["people"]}:
         stage = simulation.add_exit_stage(shapely.box(x - 0.7, y - 0.7, x + 0.7, y + 0.7))

@@ -66,10 +66,7 @@ def _check_world(scenario: Scenario) -> None:
             fail(f"world.doors.{k}", got, "an opening that lies on one wall", remedy)
         times = [t for span in door.open or () for t in span]
         if any(a >= b for a, b in pairwise(times)):
-            got, expected = (
-                f"{[list(span) for span in door.open or ()]}",
-                "times that ascend: [[from, to], [from, to], …]",
-            )
+            got, expected = f"{[list(span) for span in door.open or ()]}", "times that ascend: [[from, to], …]"
             fail(f"world.doors.{k}.open", got, expected, "sort them, and join what overlaps")
     for k, stairs in enumerate(world.stairs):
         if stairs.foot == stairs.head:

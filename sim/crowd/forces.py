@@ -12,11 +12,11 @@ forces turn or move with it. The order of people changes them by rounding only.
 
 Model: boids inside a group (Reynolds 1987). Separation: members repel each other; alignment: they take up the others'
 velocity; cohesion: they keep their places in the formation, or in a flock, which has none, go to the middle of their
-neighbours. Between strangers: a power law of the time to collision between strangers (Karamouzas, Skinner & Guy
-2014). *Ours*: groups also avoid each other as wholes, so strangers walk round a group and seldom through it. A group
-waits at its gathering point until all members are there. Groups of one procession follow each other on one way: each
-takes up the speed of the one ahead and corrects its distance from it, as members their places, and waits for the one
-behind.
+neighbours. Between strangers: a power law of the time to collision (Karamouzas, Skinner & Guy 2014). *Ours*: people
+slow down for a stranger ahead who walks the same way, and evade others who come nearer. Groups also avoid each other as
+wholes, so strangers walk round a group and seldom through it. A group waits at its gathering point until all members
+are there. Groups of one procession follow each other on one way: each takes up the speed of the one ahead, corrects its
+distance from it, as members their places, and waits for the one behind.
 """
 
 from __future__ import annotations
@@ -55,6 +55,9 @@ COS, SIN, SWAY_X, SWAY_Y, AMPLITUDE = range(5)
     COUNT, MEAN_X, MEAN_Y, MEAN_VX, MEAN_VY, RADIUS, MAX_OFF_PLACE, WANTED_VX, WANTED_VY, AVOIDED, MEAN_AHEAD,
     MEAN_LEFT,
 ) = range(12)  # fmt: skip
+
+# what a waypoint lies in if in no gate: nothing, as a point of the script or a goal, or beside the end of a wall
+FREE, CORNER = -1, -2
 
 # columns of GroupArrays.boids (G, 4): repulsion of two members at distance zero, m/s²; distance at which it ends, m;
 # rate at which a member takes up the others' mean velocity, 1/s, and goes to its place or their middle, 1/s

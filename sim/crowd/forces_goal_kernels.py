@@ -275,16 +275,16 @@ def _seek(  # type: ignore[no-untyped-def]
                 tx = (route[g, w, 0] + ox - x) / GATHER_TIME
                 ty = (route[g, w, 1] + oy - y) / GATHER_TIME
             else:
-                own, align = on_stairs, boids[g, ALIGN]
+                own, align = 1.0, boids[g, ALIGN]
                 if flock[g]:
-                    own *= pace[i] / speed[g]
+                    own = pace[i] / speed[g]
                     mx, my, mvx, mvy = middle[i, X], middle[i, Y], middle[i, VX], middle[i, VY]
                 else:
                     mx, my = status[g, MEAN_X] + ox, status[g, MEAN_Y] + oy
                     mvx, mvy = status[g, MEAN_VX], status[g, MEAN_VY]
-                limit = speed[g] * (1.0 + HASTE) * (own / on_stairs)
-                tx = own * status[g, WANTED_VX] + boids[g, COHERE] * (mx - x)
-                ty = own * status[g, WANTED_VY] + boids[g, COHERE] * (my - y)
+                limit = speed[g] * (1.0 + HASTE) * own
+                tx = on_stairs * own * status[g, WANTED_VX] + boids[g, COHERE] * (mx - x)
+                ty = on_stairs * own * status[g, WANTED_VY] + boids[g, COHERE] * (my - y)
         limit *= on_stairs
         size = sqrt(tx * tx + ty * ty)
         if size > limit:

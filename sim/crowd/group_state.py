@@ -10,22 +10,15 @@ from __future__ import annotations
 import numpy as np
 
 from scenarios.schema.scenario import CrowdSpec
+
+# isort: off
+# fmt: off
 from sim.crowd.forces import (
-    ALIGN,
-    ALONE,
-    END,
-    FLOCK_ALIGNMENT,
-    FLOCK_REACH,
-    GATHER,
-    IN_GROUP,
-    LEAVE,
-    PASS,
-    REACH,
-    STAND,
-    TO_TARGET,
-    GroupArrays,
-    PeopleArrays,
+    ALIGN, ALONE, END, FLOCK_ALIGNMENT, FLOCK_REACH, FREE, GATHER, IN_GROUP, LEAVE, PASS, REACH, STAND, TO_TARGET,
+    GroupArrays, PeopleArrays,
 )
+# fmt: on
+# isort: on
 from sim.crowd.formation import assign, standing, to_world, walking
 from sim.crowd.navigation import Navigator
 from sim.crowd.population import EnteringGroup, walking_speed
@@ -44,14 +37,14 @@ class GroupState:
     State: alive: index of each existing group by name; processions: the indices of its sub-groups, front first, by
     index; arrays: the ways of groups, as the kernels use them; next_group: index of the next new group; settled:
     indices of groups that stand in a circle. By group index, also for groups that ended: members (columns), spacing
-    (m), goals (point and "stand", "leave" or "walk"); gate (G, W): the gate that each waypoint lies in, -1 for none;
-    beyond (G, W): the side of it to which the way leads, 1.0 for its left, or -1.0. everybody: all people, by column,
-    as the kernels use those who are present; its columns are also places (in the formation, m), group_of (group index),
-    mode and queue_of (index of the queue order, -1 in no queue). Also by column: targets (place in the queue, or where
-    a held person stands, m); held: True for a person who stays behind at a stop; alone: True for a person who walks
-    alone, at `share` of the speed, to the point `aims`, m; waypoint (the first one not passed); apart: of people who
-    have lost the group, the first column of those with whom they walk, else -1; gone: True for a person who has come to
-    the end of the way alone, and leaves; present; free_speed (m/s).
+    (m), goals (point and "stand", "leave" or "walk"); gate (G, W): the gate that each waypoint lies in, FREE or CORNER
+    for none; beyond (G, W): the side of it to which the way leads, 1.0 for its left, or -1.0. everybody: all people, by
+    column, as the kernels use those who are present; its columns are also places (in the formation, m), group_of (group
+    index), mode and queue_of (index of the queue order, -1 in no queue). Also by column: targets (place in the queue,
+    or where a held person stands, m); held: True for a person who stays behind at a stop; alone: True for a person who
+    walks alone, at `share` of the speed, to the point `aims`, m; waypoint (the first one not passed); apart: of people
+    who have lost the group, the first column of those with whom they walk, else -1; gone: True for a person who has
+    come to the end of the way alone, and leaves; present; free_speed (m/s).
     """
 
     def __init__(self, entering: list[EnteringGroup], new: int, navigator: Navigator, crowd: CrowdSpec) -> None:
@@ -73,7 +66,7 @@ class GroupState:
         self.share = np.ones(len(people))
         self.alone, self.gone = np.zeros(len(people), np.bool_), np.zeros(len(people), np.bool_)
         self.waypoint, self.apart = np.zeros(len(people), np.int64), np.full(len(people), -1)
-        self.gate, self.beyond = np.full(self.arrays.kind.shape, -1), np.zeros(self.arrays.kind.shape)
+        self.gate, self.beyond = np.full(self.arrays.kind.shape, FREE), np.zeros(self.arrays.kind.shape)
         for g in entering:
             self.group_of[self.members[g.index]] = g.index
             self.processions[g.head].append(g.index)
@@ -134,12 +127,12 @@ class GroupState:
         point.
         """
         way: list[tuple[Array, int]] = [] if gather is None else [(gather, GATHER)]
-        gates = [-1] * len(way)
+        gates = [FREE] * len(way)
         here = start if gather is None else gather
         for target in [*via, goal]:
             found = self.navigator.way(here, target)
             # Where no way exists, the group walks straight.
-            points, gate = found if found is not None else (target[None], np.full(1, -1))
+            points, gate = found if found is not None else (target[None], np.full(1, FREE))
             way += [(p, PASS) for p in points]
             gates += gate.tolist()
             here = target
@@ -158,15 +151,8 @@ class GroupState:
         """Gives the sub-groups behind the head g its way; they follow it."""
         arrays = self.arrays
         for part in self.processions[g][1:]:
-            for values in (
-                arrays.route,
-                arrays.kind,
-                arrays.length,
-                arrays.current,
-                arrays.finish,
-                self.gate,
-                self.beyond,
-            ):
+            way = arrays.route, arrays.kind, arrays.length, arrays.current, arrays.finish, self.gate, self.beyond
+            for values in way:
                 values[part] = values[g]
             arrays.arrived[part], arrays.filing[part], arrays.held_up[part] = False, False, 0.0
             self.waypoint[self.members[part]] = 0
@@ -189,9 +175,9 @@ class GroupState:
         """
         self.arrays = arrays = self.arrays.with_room(len(way))
         if room := arrays.kind[0].size - self.gate[0].size:
-            self.gate = np.pad(self.gate, ((0, 0), (0, room)), constant_values=-1)
+            self.gate = np.pad(self.gate, ((0, 0), (0, room)), constant_values=FREE)
             self.beyond = np.pad(self.beyond, ((0, 0), (0, room)))
-        self.gate[g] = -1
+        self.gate[g] = FREE
         for k, (point, kind) in enumerate(way):
             arrays.route[g, k], arrays.kind[g, k] = point, kind
         arrays.length[g], arrays.current[g], arrays.speed[g] = len(way), 0, speed

@@ -9,6 +9,7 @@ import numpy as np
 
 from scenarios.schema.geometry import cut_walls
 from scenarios.schema.world import WorldSpec
+from sim.crowd.forces import CORNER, FREE
 from sim.elementary import dot, length
 from sim.geometry.walls import blocked, wall_distances
 from sim.types import Array, Ints, Scene
@@ -110,13 +111,14 @@ class Navigator:
         return 1.0 if (there if abs(here) < TOUCH else -here) > 0 else -1.0
 
     def way(self, start: Array, goal: Array) -> tuple[Array, Ints] | None:
-        """Returns the points (K, 2) m to walk to, the goal last, and for each the gate that it lies in, -2 for none, -1
-        for the goal.
+        """Returns the points (K, 2) m to walk to, the goal last, and for each the gate that it lies in (K,).
+
+        It is CORNER for points in no gate, and FREE for the goal.
 
         start, goal (2,): m. None if there is no way.
         """
         ends = np.stack([start, goal])
-        straight = ends[1:], np.full(1, -1)
+        straight = ends[1:], np.full(1, FREE)
         if not len(self.closed):
             return straight
         from sim.crowd.wayfinding_kernels import in_sight, sees
@@ -134,6 +136,5 @@ class Navigator:
         while path[-1] != n:
             path.append(int(self._before[n, path[-1]]))
         nodes = np.array(path[::-1])
-        return np.concatenate([self.nodes[nodes], ends[1:]]), np.append(
-            np.where(nodes < len(self.gates), nodes, -2), -1
-        )
+        gates = np.append(np.where(nodes < len(self.gates), nodes, CORNER), FREE)
+        return np.concatenate([self.nodes[nodes], ends[1:]]), gates

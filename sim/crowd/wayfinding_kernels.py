@@ -11,9 +11,7 @@ from math import sqrt
 import numpy as np
 
 from sim.compiler import njit
-from sim.crowd.forces import BOTH, END, GATHER, HELD, HOLDER, LEAVE, NEXT, SHUT, X, Y
-
-FREE, CORNER = -1, -2  # no gate, but a point of the scenario's, or one round the end of a wall
+from sim.crowd.forces import BOTH, CORNER, END, FREE, GATHER, HELD, HOLDER, LEAVE, NEXT, SHUT, X, Y
 
 BODY, TOUCH = 0.2, 0.01  # m: people walk no nearer past the end of a wall; ends so near are one
 STEP_ASIDE = 0.5  # m ahead: past ends of walls so near to them people squeeze
@@ -290,8 +288,8 @@ def _start_files(  # type: ignore[no-untyped-def]
                 w += 1
             current[g] = w
             k = gate[g, w]
-            at_gate = k >= 0 and _near(closed[first:], k, middle[g, X], middle[g, Y], NEAR_GATE)
-            if at_gate or not _sees_point(middle[g, X], middle[g, Y], route[g, w], k, closed, first):
+            at_gate = k >= 0 and _near(closed[first:], k, x, y, NEAR_GATE)
+            if at_gate or not _sees_point(x, y, route[g, w], k, closed, first):
                 filing[g], since[g] = True, t
     for i in range(len(state)):
         g = group_of[i]
@@ -374,11 +372,11 @@ def find_ways(  # type: ignore[no-untyped-def]
     """Decides at time t (s) how all people walk for the next dt s.
 
     state (P, 4), m, m/s; there (P,): who is present. waits (P,): True for people who walk to `target` (P, 2), m, and
-    stand there. beyond (G, W): side of the gate to which a way leads, 1.0 for its left,
-    or -1.0. wait_time: s for which a group in file waits for its last. Returns whether somebody walks alone, or did
-    before, and whether a group has waited so long. Overwritten: alone (P,), and for those who
-    walk alone aim (P, 2), m, and share (P,) of the speed; gone (P,): True for who has come to the end of the way alone
-    and leaves. Updated: waypoint (P,), filing (G,), since (G,), s, current (G,), gate_state (K, 3).
+    stand there. beyond (G, W): side of the gate to which a way leads, 1.0 for its left, or -1.0. wait_time: s for which
+    a group in file waits for its last. Returns whether somebody walks alone, or did before, and whether a group has
+    waited so long. Overwritten: alone (P,), and for those who walk alone aim (P, 2), m, and share (P,) of the speed;
+    gone (P,): True for who has come to the end of the way alone and leaves. Updated: waypoint (P,), filing (G,), since
+    (G,), s, current (G,), gate_state (K, 3).
     """
     people, gates, walks, changed = len(state), closed[first:], there & ~waits, alone.any()
     count, middle = _middles(state, walks, group_of, len(length))

@@ -29,7 +29,7 @@ from sim.store import packs, sequence_folder
 from sim.store.atomic import PARTIAL, lock_folder, remove_partials, write_file
 from sim.store.group_files import stands_in, warn_of
 from sim.store.own_files import is_side_file, output_path, output_paths
-from sim.store.seal import MANIFEST, damaged_files, identity, is_own_sequence, read_manifest, reject_runs
+from sim.store.seal import MANIFEST, SHARDS, damaged_files, identity, is_own_sequence, read_manifest, reject_runs
 from sim.streams import check_streams
 from sim.types import Camera, Sequence
 from sim.workers.start import WorkerOptions, start_workers
@@ -317,7 +317,7 @@ def generate(
         check_stride(stride, one.scenario.camera.fps)
         jobs.append(SequenceJob(output_path(folder, one.name, f"-s{seed:05d}"), one, seed, wanted, images, stride))
     with _dataset(root, folder):
-        packed = next(folder.glob("*/*-s[0-9]*.tar"), None)
+        packed = next(folder.glob(f"*/{SHARDS}"), None)
         reject(packed is not None, folder, "a packed dataset", "one of folders", "add --pack, or choose another --out")
         for job in jobs:
             stored_manifest(job)

@@ -46,9 +46,8 @@ class PixelGeometry:
     """What each pixel's centre shows of the empty scene."""
 
     depth: Floats  # (H, W) float32: m along the optical axis; inf for sky
-    kind: NDArray[
-        np.uint8
-    ]  # (H, W) uint8: NOTHING (sky), GROUND, WALL, PILLAR, TREAD, RISER or BOX of `sim.scene.raycast`
+    # (H, W) uint8: NOTHING (sky), GROUND, WALL, PILLAR, TREAD, RISER or BOX of `sim.scene.raycast`
+    kind: NDArray[np.uint8]
     place: Floats  # (3, H, W) float32: x, y, z in m in the world; 1e9 for sky
 
 
@@ -182,9 +181,8 @@ class CameraView:
         from sim.render.blur_noise_kernels import blur_all
 
         out, flat = np.empty_like(self.empty_canvas), (self.height, 3 * self.width)
-        blur_all(
-            self.empty_canvas.reshape(flat), blur_weights(self.picture.blur_px, self.picture.sharpen), out.reshape(flat)
-        )
+        weights = blur_weights(self.picture.blur_px, self.picture.sharpen)
+        blur_all(self.empty_canvas.reshape(flat), weights, out.reshape(flat))
         return out
 
     @cached_property

@@ -10,13 +10,13 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.render.air_kernels import lamp_light, night
-from sim.render.materials import BACKDROPS, BRICK, GRASS, GREY, SKY, STEP, STONE, WALLS
+from sim.render.materials import BRICK, GRASS, GREY, SKY, STEP, STONE, WALLS
 
 # isort: off
 # fmt: off
 from sim.render.texture_kernels import (
-    COS, SIN, contrast_kept, facade, grain, lattice_value, paint_lines, parked_car, plant_cover, poster, skyline, slabs,
-    stain, value_noise,
+    COS, HOUSES, SIN, contrast_kept, facade, grain, lattice_value, paint_lines, parked_car, plant_cover, poster,
+    skyline, slabs, stain, value_noise,
 )
 from sim.scene.raycast import (
     BOX, GROUND, HIT_INDEX, HIT_KIND, HIT_PLACE, HIT_SLOTS, NORMAL_X, NOTHING, PILLAR, RISER, TREAD, WALL,
@@ -26,7 +26,7 @@ from sim.scene.raycast import (
 from sim.scene.boxes import AXES, COLOUR, GLOSS, HALF, MIDDLE, PATTERN, PATTERNS, PERIOD
 from sim.scene.raycast_kernels import first_hit, has_solids, look
 
-PANELS, WINDOWS, HOUSES = WALLS.index("panels"), WALLS.index("windows"), BACKDROPS.index("houses")
+PANELS, WINDOWS = WALLS.index("panels"), WALLS.index("windows")
 KERB = 0.1  # m: borders less ragged have kerbstones
 PAINT = 225.0  # grey level of painted lines at full light
 SKY_DISTANCE = 200.0  # m: what fog hides of the sky
@@ -147,6 +147,12 @@ def _sky(d, key, palette, out):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True)
+def _facing(normal, sun):  # type: ignore[no-untyped-def]
+    """Returns the sun's light on a surface that nothing shades, over that on level ground (in a low sun, over 0.3)."""
+    return max(0.0, normal[0] * sun[0] + normal[1] * sun[1] + normal[2] * sun[2]) / max(sun[2], 0.3)
+
+
+@njit(cache=True)
 def _sunlit(point, normal, sun, penumbra, solids, spare, hit):  # type: ignore[no-untyped-def]
     """Returns the share of four points across the penumbra from which no solid thing hides the sun."""
     if not has_solids(solids):
@@ -260,8 +266,7 @@ def _mirror(d, scale, distance, sun, shadow, solids, size, style, palette, more)
         start[k] += t * r[k]
     footprint = (distance + t if scale > 0 else 1.0) / abs(scale)
     _surface(hit, start, solids, size, footprint, 1.0, style, palette, out)
-    facing = max(0.0, hit[NORMAL_X] * sun[0] + hit[NORMAL_X + 1] * sun[1] + hit[NORMAL_X + 2] * sun[2])
-    light = (1 - shadow) * (0.85 + 0.15 * hit[NORMAL_X + 2]) + shadow * facing / max(sun[2], 0.3)
+    light = (1 - shadow) * (0.85 + 0.15 * hit[NORMAL_X + 2]) + shadow * _facing(hit[NORMAL_X:], sun)
     for k in range(3):
         out[k] *= light
 
@@ -297,7 +302,7 @@ def _point_colour(  # type: ignore[no-untyped-def]
     footprint = distance / abs(scale) / np.sqrt(max(slope, 0.02))
     index = int(hit[HIT_INDEX])
     grass, plants = _surface(hit, point, solids, size, footprint, slope, style, palette, out)
-    facing = max(0.0, normal[0] * sun[0] + normal[1] * sun[1] + normal[2] * sun[2]) / max(sun[2], 0.3)
+    facing = _facing(normal, sun)
     lit = _sunlit(point, normal, sun, penumbra, solids, spare, blocked) if shadow > 0 and facing > 0 else 0.0
     sunlight = shadow * facing * lit
     light = (1 - shadow) * (0.85 + 0.15 * normal[2]) + sunlight

@@ -11,7 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from sim.compiler import njit
+from sim.render.materials import BACKDROPS
 
+HEDGE, HOUSES = BACKDROPS.index("hedge"), BACKDROPS.index("houses")
 MASK = 0xFFFFFFFF
 FINER = 0.45  # wavelength of an octave of grain over that of the octave before
 COS, SIN = np.cos(0.7), np.sin(0.7)  # each octave is turned against the one before
@@ -169,10 +171,10 @@ def poster(along, z, key):  # type: ignore[no-untyped-def]
 @njit(cache=True)
 def skyline(kind, along, key):  # type: ignore[no-untyped-def]
     """Returns the height, m, of a backdrop (index in `materials.BACKDROPS`) at `along` m on it."""
-    if kind == 3:
+    if kind == HOUSES:
         return 9.0 + 4.0 * lattice_value(int(np.floor(along / 11.0)), 0, key)
     ragged = value_noise(0.15 * along, 0.0, key) + 0.4 * value_noise(1.3 * along, 0.0, key + 1)
-    return 1.7 + 0.15 * ragged if kind == 1 else 6.0 + 2.5 * ragged
+    return 1.7 + 0.15 * ragged if kind == HEDGE else 6.0 + 2.5 * ragged
 
 
 @njit(cache=True)

@@ -1,7 +1,7 @@
 """Compiled loops of `sim.scene.visibility`: which sample points of a person's silhouette in the image are visible.
 
-A sample is hidden by nearer people, walls, pillars, stairs or boxes. The tests compare the
-result with a numpy implementation.
+A sample is hidden by nearer people, walls, pillars, stairs, boxes or things. The tests compare the result with a numpy
+implementation.
 """
 
 from __future__ import annotations
@@ -142,6 +142,7 @@ def sample_visibility(  # type: ignore[no-untyped-def]
     starts (F + 1,): first row of each frame. box (R, 4) px. centre (R, K, 2) px, inverse (R, K, 3): of the parts.
     distance (R,): occlusion order, nearest lowest. pos (R, 2) m: feet. unproject (3, 3): `raycast.unprojection`.
     solids: None without walls and pillars that can hide somebody. stairs: stairs and boxes alone; None without them.
+    things: Hiders; None without things.
     """
     # numba leaves out the branches of solids, stairs and things if they are None: half of what there is to compile.
     rows = len(box)

@@ -21,10 +21,9 @@ from pathlib import Path
 from typing import Any
 
 from scenarios.errors import InputError, reject
-from sim.hashing import file_hash
 from sim.store.atomic import staged_path, write_file
 from sim.store.own_files import file_name, is_ours
-from sim.store.seal import REDO, read_manifest
+from sim.store.seal import SHARDS, check_file, file_facts, read_manifest
 from sim.store.tables import StoredTable, read_table, table_bytes
 
 SEEDS = 100  # of a shard
@@ -43,7 +42,7 @@ def seal_of(shard: Path) -> Path:
 
 def shards_in(folder: Path) -> list[Path]:
     """Returns the shards in a folder or at most 2 levels below it, sorted."""
-    found = (path for below in ("", "*/", "*/*/") for path in folder.glob(f"{below}*-s[0-9]*.tar"))
+    found = (path for below in ("", "*/", "*/*/") for path in folder.glob(below + SHARDS))
     return sorted(filter(is_shard, found))
 
 
@@ -96,7 +95,7 @@ def new_shard(path: Path, split: str, facts: dict[str, Any]) -> Iterator[tuple[S
         with tarfile.open(partial / path.name, "w", format=tarfile.GNU_FORMAT) as tar:
             writer = ShardWriter(tar, shard, split)
             yield writer, partial
-        stated = {**facts, "sha256": file_hash(partial / path.name), "size": (partial / path.name).stat().st_size}
+        stated = facts | file_facts({path.name: partial / path.name})[path.name]
         seal_of(path).unlink(missing_ok=True)
         (partial / path.name).replace(path)
         write_file(seal_of(path), _table(writer.rows, stated))
@@ -126,10 +125,7 @@ def write_index(split: Path) -> int:
 def check_shard(shard: Path) -> StoredTable:
     """Returns the seal of a shard; raises InputError if the tar is not the one that it names."""
     seal = read_seal(shard)
-    size = shard.stat().st_size
-    expected = f"the file of {seal.facts.get('size')} bytes that {seal_of(shard).name} names"
-    same = size == seal.facts.get("size") and file_hash(shard) == seal.facts.get("sha256")
-    reject(not same, shard, f"altered: {size} bytes", expected, REDO)
+    check_file(shard, {"bytes": 0, "sha256": ""} | dict(seal.facts), seal_of(shard).name)
     return seal
 
 

@@ -25,6 +25,7 @@ from sim.types import BACKGROUNDS, Sequence
 
 MANIFEST, RUN = "manifest.json", "run.json"
 # what every manifest.json and run.json of ours has, and no other program writes
+SHARDS = "*-s[0-9]*.tar"  # names of the shards of packed datasets
 MARKS: Marks = {"scenario_hash": str, "content_hash": str}
 RUN_MARKS: Marks = {"boxes": str}
 
@@ -154,7 +155,7 @@ def is_sequence(folder: Path) -> bool:
 def is_dataset(path: Path) -> bool:
     """Returns True if the folder is a stored sequence, a split of a dataset, or a dataset, perhaps a damaged one."""
     found = (manifest for below in ("", "*/", "*/*/") for manifest in path.glob(below + MANIFEST))
-    shards = (tar.with_suffix(".parquet") for below in ("", "*/", "*/*/") for tar in path.glob(below + "*-s*.tar"))
+    shards = (tar.with_suffix(".parquet") for below in ("", "*/", "*/*/") for tar in path.glob(below + SHARDS))
     return any(is_ours(manifest, MARKS) is not False for manifest in found) or any(map(is_ours, shards))
 
 
