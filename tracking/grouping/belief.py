@@ -1,7 +1,8 @@
 """The belief that two people belong together: of each pair and step its log-odds, from fitted tables of evidence.
 
-The belief of a row (`pair_evidence`) is a sum of tables, read off by linear interpolation. `flockscope fit grouping`
-fits the tables to simulated scenes and writes them as a text file; belief.toml beside this module is the default.
+The belief of a row (`pair_evidence`) is a sum of tables, read off by linear interpolation, between values of a quantity
+and between levels of noise: the same chord tells less where positions err more. `flockscope fit grouping` fits the
+tables to simulated scenes and writes them as a text file; belief.toml beside this module is the default.
 
 From one evidence two decisions, each with a column of log-odds in every table. Who is together *now* follows from the
 probability and `threshold`, by the loss of pairwise F1. *Events* follow from groups that change late (`stay`, `come`),
@@ -15,7 +16,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -27,14 +28,16 @@ from scenarios.limits import is_number
 from scenarios.loading.toml_files import parse, toml_value
 from sim.truth.merge_split_rules import runs
 from sim.types import Array, Ints, Tracks
-from tracking.grouping.pair_evidence import NAMES, StepRows, evidence, frames_per_step, step_rows
+from tracking.grouping.mate_share import MateShare
+from tracking.grouping.pair_evidence import NAMES, evidence
+from tracking.grouping.person_motion import StepRows, frames_per_step, step_rows
 from tracking.grouping.tracks_table import tabulate
 
 FROZEN = Path(__file__).with_name("belief.toml")  # The default belief.
 KIND = "belief"
 UNSEEN = -4.0  # Belief about two people who are too far apart for a row: log-odds.
 DECISIONS = NOW, EVENTS = ("now", "events")  # Columns of a table.
-NUMBERS = ("threshold", "stay", "come", "memory")  # Numbers of `Belief` in its file.
+NUMBERS = ("threshold", "share", "stay", "come", "memory")  # Numbers of `Belief` in its file.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -43,7 +46,7 @@ class Table:
 
     name: str  # one of `NAMES`
     at: Array  # (K,): ascending values of the quantity
-    log_odds: Array  # (2, K): at these values, for `DECISIONS`
+    log_odds: Array  # (2, L, K): for `DECISIONS`, by levels of noise, at these values
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,8 +54,10 @@ class Belief:
     """A fitted belief: its tables, and how beliefs of pairs become groups."""
 
     tables: tuple[Table, ...]
-    bias: Array  # (2,): log-odds added to the tables, for `DECISIONS`
+    noise: Array  # (L,): ascending levels of noise, m, the standard deviation of a person's position
+    bias: Array  # (2, L): log-odds added to the tables, for `DECISIONS`, by levels of noise
     threshold: float = 0.5  # probability above which two people are together now
+    share: float = 0.1  # of mates among the pairs of the fit, where none is known (`mate_share`)
     # stay, come: log-odds added for pairs that were in one group a step before, and taken from all others: groups
     # of events change the later the greater they are
     stay: float = 7.0
@@ -73,35 +78,43 @@ class Belief:
     def from_toml(cls, path: str | Path) -> Belief:
         """Returns the belief in a file that `toml_text` wrote. Raises InputError for another file or wrong values."""
         content = parse(Path(path))
-        rows, keys = content.pop("table", None), {"bias", *NUMBERS}
+        rows, keys = content.pop("table", None), {"noise", "bias", *NUMBERS}
         if content.pop("grouping", None) != KIND or not isinstance(rows, list) or not rows:
             _refuse(path, "grouping", "another file", f'grouping = "{KIND}" and at least one [[table]]')
         if content.keys() != keys:
             _refuse(path, min(content.keys() - keys, default="its keys"), sorted(content), ", ".join(sorted(keys)))
-        bias = _numbers(path, "bias", content.pop("bias"), 2)
+        noise = _ascending(path, "noise", content.pop("noise"))
+        bias = _matrix(path, "bias", content.pop("bias"), (len(DECISIONS), len(noise)))
         numbers = {name: float(_numbers(path, name, [value], 1, low=0.0)[0]) for name, value in content.items()}
-        return cls(tuple(_table(path, f"table {k}", row) for k, row in enumerate(rows, 1)), bias, **numbers)
+        tables = tuple(_table(path, f"table {k}", row, len(noise)) for k, row in enumerate(rows, 1))
+        return cls(tables, noise, bias, **numbers)
 
     def toml_text(self, comment: str = "") -> str:
         """Returns the belief as the text of a TOML file. comment: lines of text to begin it with, without "#"."""
         lines = [*(f"# {line}" for line in comment.splitlines()), f'grouping = "{KIND}"']
-        lines += [f"bias = {toml_value(np.round(self.bias, 4).tolist())}"]
+        lines += [f"{name} = {toml_value(np.round(getattr(self, name), 3).tolist())}" for name in ("noise", "bias")]
         lines += [f"{name} = {toml_value(round(float(getattr(self, name)), 4))}" for name in NUMBERS]
         for table in self.tables:
             lines += ["", "[[table]]", f"name = {toml_value(table.name)}"]
             rows = {"at": table.at, **dict(zip(DECISIONS, table.log_odds, strict=True))}
-            lines += [f"{key} = {toml_value(np.round(values, 4).tolist())}" for key, values in rows.items()]
+            lines += [f"{key} = {toml_value(np.round(values, 3).tolist())}" for key, values in rows.items()]
         return "\n".join([*lines, ""])
 
-    def log_odds(self, values: Array) -> Array:
-        """Returns log-odds (R, 2), columns as `DECISIONS`, of R rows of quantities (R, len(NAMES)), nan if unknown."""
+    def log_odds(self, values: Array, noise: Array) -> Array:
+        """Returns log-odds (R, 2), columns as `DECISIONS`, of R rows of quantities (R, len(NAMES)), nan if unknown, and
+        of the noise of positions (R,), m."""
         from tracking.grouping.belief_kernels import table_sums
 
-        column = np.array([NAMES.index(table.name) for table in self.tables])
-        cut = np.cumsum([0, *(len(table.at) for table in self.tables)])
-        at = np.concatenate([table.at for table in self.tables])
-        heights = np.concatenate([table.log_odds for table in self.tables], axis=1)
-        return table_sums(values, self.bias, column, cut, at, heights)
+        return table_sums(values, noise, self.noise, self.bias, *_joined(self))
+
+
+@lru_cache(maxsize=8)
+def _joined(belief: Belief) -> tuple[Ints, Ints, Array, Array]:
+    """Returns all tables as one: column of each among `NAMES`, where its knots begin and end, knots, and log-odds."""
+    column = np.array([NAMES.index(table.name) for table in belief.tables])
+    cut = np.cumsum([0, *(len(table.at) for table in belief.tables)])
+    at = np.concatenate([table.at for table in belief.tables])
+    return column, cut, at, np.concatenate([table.log_odds for table in belief.tables], axis=2)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +131,11 @@ class PairBeliefs:
 def pair_beliefs(seen: StepRows, seconds: float, belief: Belief) -> PairBeliefs:
     """Returns the beliefs of all pairs of people in the steps in which the two are within 4 m of each other. seconds:
     length of a step, s."""
-    parts = [(rows.step, rows.a, rows.b, belief.log_odds(rows.values)) for rows in evidence(seen, seconds)]
+    share, parts = MateShare(belief.share), []
+    for rows in evidence(seen, seconds):
+        log_odds = belief.log_odds(rows.values, rows.noise)
+        log_odds[:, 0] += share.add(rows.step, rows.pair, log_odds[:, 0])
+        parts.append((rows.step, rows.a, rows.b, log_odds))
     if not parts:
         nobody = np.zeros(0, np.int64)
         return PairBeliefs(nobody, nobody, nobody, np.zeros((0, 2)))
@@ -137,17 +154,28 @@ def default_belief() -> Belief:
     return Belief.from_toml(FROZEN)
 
 
-def _table(path: str | Path, place: str, row: Any) -> Table:
+def _table(path: str | Path, place: str, row: Any, levels: int) -> Table:
     keys = ("name", "at", *DECISIONS)
     if not isinstance(row, dict) or set(row) != set(keys):
         _refuse(path, place, row, ", ".join(keys))
     if row["name"] not in NAMES:
         _refuse(path, f"{place}: name", row["name"], "one of " + "; ".join(NAMES))
-    count = len(row["at"]) if isinstance(row["at"], list) else 1
-    columns = np.array([_numbers(path, f"{place}: {key}", row[key], count) for key in keys[1:]])
-    if len(columns[0]) < 2 or (np.diff(columns[0]) <= 0).any():
-        _refuse(path, f"{place}: at", row["at"], "two ascending numbers or more")
-    return Table(row["name"], columns[0], columns[1:])
+    at = _ascending(path, f"{place}: at", row["at"])
+    heights = [_matrix(path, f"{place}: {key}", row[key], (levels, len(at))) for key in DECISIONS]
+    return Table(row["name"], at, np.array(heights))
+
+
+def _ascending(path: str | Path, place: str, values: Any) -> Array:
+    found = _numbers(path, place, values, len(values) if isinstance(values, list) else 1)
+    if len(found) < 2 or (np.diff(found) <= 0).any():
+        _refuse(path, place, values, "two ascending numbers or more")
+    return found
+
+
+def _matrix(path: str | Path, place: str, rows: Any, shape: tuple[int, int]) -> Array:
+    if not isinstance(rows, list) or len(rows) != shape[0]:
+        _refuse(path, place, rows, f"{shape[0]} rows of {shape[1]} numbers")
+    return np.array([_numbers(path, place, row, shape[1]) for row in rows])
 
 
 def _numbers(path: str | Path, place: str, values: Any, count: int, low: float = -math.inf) -> Array:

@@ -1,8 +1,12 @@
-"""What tells whether two people belong together: their distance and motion over time, in steps.
+"""What tells whether two people belong together: their distance and motion over time, in steps, as far as it is known.
 
-`step_rows` averages positions over steps of at most 0.4 s, and `evidence` returns one row per pair and step with
-the quantities of `QUANTITIES` averaged over the past (`TIMES`), and `NEAR`. Nothing looks ahead. Only positions are
-used: velocities are chords of positions over 0.8 s. Lengths are in m.
+`evidence` returns one row per pair and step (`person_motion`) with the quantities of `QUANTITIES` averaged over the
+past (`TIMES`), `PACE`, `IN_NOISE` and `NEAR`, and with the noise of the two people's positions. Nothing looks ahead.
+Only positions are used. Lengths are in m.
+
+Positions err, and a chord of 0.8 s takes an error for motion. What lasts in spite of errors is the mean offset from one
+to the other, and the difference of velocities by regression. Of mates they are small: `IN_NOISE` are their lengths in
+units of what mates and errors make of them, so that what lies along the direction of great errors counts less.
 
 When and where people were first seen is no evidence, nor how many are around: it tells who belongs together in
 simulated scenes, and misleads in others. What the nearest others do (`OTHERS`) is evidence for events only: it misleads
@@ -12,35 +16,49 @@ about who is together now. For how long two have been near (`NEAR`) is none for 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_VELOCITY, close_pairs
 from sim.types import Array, Bools, Ints
+from tracking.grouping import person_motion
+from tracking.grouping.person_motion import CORRELATION, Motion, PersonMotion, StepRows
 
-STEP = 0.4  # s: longest step, unless one frame lasts longer.
-CHORD = 0.8  # s over which velocities are measured: two frames of a recording with 2.5 frames/s.
 REACH = 4.0  # m: pairs farther apart have no evidence.
 STANDING = 0.3  # m/s.
 TOUCHING = 0.1  # m: least distance by which the growth of the distance is divided.
 TIMES = (0.8, 5.0, 15.0)  # s: means over the past have weights exp(-age / time).
+# Of a file: longest distance of two people in it, m, and least cosines of two successive lines, and of line and way.
+FILE_SPACING, FILE_STRAIGHT, FILE_ALONG = 1.8, 0.866, 0.8
 LONGEST = 20.0  # s: longer times near each other tell no more.
 # Averaged over the pair's rows, with weights exp(-age / time). Unknown velocities leave nan out of the means.
 # velocity difference: of vectors, m/s. sideways, lengthwise: parts of the distance, m, across and along the mean
 # velocity of the two where that is at least 0.3 m/s, else the whole distance and nan. growth: of the distance, m/s.
 # turn: angle between the two velocities, rad, nan if one is slower than 0.3 m/s. walking difference: the velocity
 # difference, m/s, nan where turn is, so that its means outlast a stop. one walks: 1 if exactly one of the two is slower
-# than 0.3 m/s, else 0. nearer others: how many other people are nearer to the one than the other is, mean of both.
+# than 0.3 m/s, else 0. file: at how many ends of the pair others go on in one line along their way, as in a queue, nan
+# if the pair stands or is more than 1.8 m apart. nearer others: how many other people are nearer to the one than the
+# other is, mean of both.
 # common neighbours: third people less than 1.5 m from both, of velocities less than 0.7 m/s apart.
 OTHERS = ("nearer others", "common neighbours")
 QUANTITIES = (
     "distance", "velocity difference", "sideways", "lengthwise", "growth", "turn", "walking difference", "one walks",
-    *OTHERS,
+    "file", *OTHERS,
 )  # fmt: skip
 NEAR = ("time near",)  # Not averaged: the time of the pair's rows so far, s.
+# By regression over `person_motion.TIMES`, too, not averaged: speed of the mean of the two velocities, m/s.
+PACE = tuple(f"pace, {time:g} s" for time in person_motion.TIMES)
+# Lengths in standard deviations of mates and errors: of the mean offset over each of the `TIMES`, and of the difference
+# of the velocities by regression.
+MATES = (0.6, 0.25)  # m, m/s: standard deviations of mates' offsets and velocity differences.
+IN_NOISE = tuple(
+    f"{name} in noise, {time:g} s"
+    for name, times in (("offset", TIMES), ("velocity difference", person_motion.TIMES))
+    for time in times
+)
 # Names of the columns of `PairRows.values`.
-NAMES = (*(f"{name}, {time:g} s" for name in QUANTITIES for time in TIMES), *NEAR)
+NAMES = (*(f"{name}, {time:g} s" for name in QUANTITIES for time in TIMES), *PACE, *IN_NOISE, *NEAR)
 PORTION = 100_000  # Rows worked on together: bounds memory.
 
 
@@ -54,73 +72,65 @@ class PairRows:
     b: Ints
     pair: Ints  # (R,): number of the pair, from 0
     values: Array  # (R, len(NAMES)): columns `NAMES`, nan if unknown
-
-
-def frames_per_step(fps: float) -> int:
-    """Returns the number of frames in a step: the greatest number that lasts at most 0.4 s, and at least 1."""
-    return max(1, int(STEP * fps + 1e-9))
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class StepRows:
-    """Where people were seen, one row per person and step, sorted by step, then column."""
-
-    step: Ints  # (R,): from 0
-    column: Ints  # (R,): number of the person, from 0
-    pos: Array  # (R, 2): mean position in the step, m
-    time: Array  # (R,): mean time in the step, s
-
-
-def step_rows(frame: Ints, column: Ints, pos: Array, length: int, fps: float) -> StepRows:
-    """Returns each person's mean position and time in each step.
-
-    frame, column (R,), from 0, pos (R, 2), m: one row per person and frame. With n = `frames_per_step(fps)`, step s
-    ends with frame n s, so that step 0 is frame 0 alone. Frames after the last complete step are left out.
-    """
-    size = frames_per_step(fps)
-    steps, step, people = -(-length // size), -(-frame // size), int(column.max(initial=0)) + 1
-    whole = step < steps
-    key, row, count = np.unique((step * people + column)[whole], return_inverse=True, return_counts=True)
-    total = np.stack([np.bincount(row, x[whole], len(key)) for x in (*pos.T, frame / fps)], axis=-1)
-    mean = total / count[:, None]
-    known = np.isfinite(mean[:, 0])
-    key, mean = key[known], mean[known]
-    return StepRows(key // people, key % people, mean[:, :2], mean[:, 2])
-
-
-def step_velocities(seen: StepRows, seconds: float) -> Array:
-    """Returns velocities (R, 2), m/s, from a person's earliest position in the last 0.8 s to the present one. They are
-    nan without such a position. seconds: per step."""
-    vel, people = np.full_like(seen.pos, np.nan), int(seen.column.max(initial=0)) + 1
-    key = seen.step * people + seen.column
-    for steps in range(1, max(1, round(CHORD / seconds)) + 1):
-        before = np.searchsorted(key, key - steps * people)
-        now = np.flatnonzero(key[before] == key - steps * people)
-        before = before[now]
-        vel[now] = (seen.pos[now] - seen.pos[before]) / (seen.time[now] - seen.time[before])[:, None]
-    return vel
+    noise: Array  # (R,): of the positions, m
 
 
 def evidence(seen: StepRows, seconds: float) -> Iterator[PairRows]:
     """Yields the evidence of all pairs within 4 m, in portions of whole steps, steps ascending. seconds: length of a
     step."""
-    motion, step, column, place = step_velocities(seen, seconds), seen.step, seen.column, seen.pos
-    i, j = close_pairs(step, place, REACH)
-    pair = np.unique(column[i] * (int(column.max(initial=0)) + 1) + column[j], return_inverse=True)[1]
+    people, step, column = int(seen.column.max(initial=0)) + 1, seen.step, seen.column
+    motion = PersonMotion(people, seconds).add(step, column, seen.pos, seen.time)
+    i, j = close_pairs(step, seen.pos, REACH)
+    pair = np.unique(column[i] * people + column[j], return_inverse=True)[1]
     order = np.lexsort((pair, step[i]))
     i, j, pair = i[order], j[order], pair[order]
-    means = ExponentialMeans(int(pair.max(initial=-1)) + 1, seconds)
+    means = PairMeans(int(pair.max(initial=-1)) + 1, seconds)
     for r in _portions(step[i]):
-        values = means.add(step[i[r]], pair[r], instant_evidence(place, motion, i[r], j[r]))
-        yield PairRows(step[i[r]], column[i[r]], column[j[r]], pair[r], values)
+        moment = pair_moment(seen.pos, motion, i[r], j[r])
+        values = means.add(step[i[r]], pair[r], moment)
+        yield PairRows(step[i[r]], column[i[r]], column[j[r]], pair[r], values, moment.noise_level)
 
 
-def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints, *, others: bool = True) -> Array:
-    """Returns the `QUANTITIES` (R, 10) of R pairs, for one moment each.
+@dataclass(frozen=True, slots=True, eq=False)
+class PairMoment:
+    """R pairs in one moment each: `QUANTITIES` (R, 11); offset (R, 2), m, from the one to the other; change (R, 2, 2),
+    difference of their velocities by regression, m/s, and pace (R, 2), that of their mean; noise (R, 3), sum of their
+    `Motion.noise`."""
 
-    pos, vel (N, 2), m, m/s: of N rows, one per person and step. i, j (R,): the two rows of each pair; all pairs within
+    quantities: Array
+    offset: Array
+    change: Array
+    pace: Array
+    noise: Array
+
+    @property
+    def noise_level(self) -> Array:
+        """The standard deviation of a person's position, both directions together, (R,), m."""
+        return np.asarray(np.sqrt(np.maximum(self.noise[:, 0] + self.noise[:, 2], 0.0) / 2))
+
+    def rows(self, rows: Ints) -> PairMoment:
+        """Returns the pairs `rows` (K,)."""
+        return PairMoment(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+
+def pair_moment(pos: Array, motion: Motion, i: Ints, j: Ints, *, others: bool = True) -> PairMoment:
+    """Returns R pairs as `PairMeans` adds them.
+
+    pos (N, 2), m, motion: of N rows, one per person and step. i, j, others: as of `instant_evidence`.
+    """
+    quantities = instant_evidence(pos, motion, i, j, others=others)
+    first, second = motion.slope[i], motion.slope[j]
+    pace = np.hypot(*(first + second).T).T / 2
+    return PairMoment(quantities, pos[j] - pos[i], second - first, pace, motion.noise[i] + motion.noise[j])
+
+
+def instant_evidence(pos: Array, motion: Motion, i: Ints, j: Ints, *, others: bool = True) -> Array:
+    """Returns the `QUANTITIES` (R, 11) of R pairs, for one moment each.
+
+    pos (N, 2), m, motion: of N rows, one per person and step. i, j (R,): the two rows of each pair; all pairs within
     4 m must be given. others: False leaves the columns `OTHERS` nan, which only beliefs about events need.
     """
+    vel = motion.vel
     apart, change, mean = pos[j] - pos[i], vel[j] - vel[i], (vel[i] + vel[j]) / 2
     distance, differ, pace = (np.hypot(*x.T) for x in (apart, change, mean))
     walks = pace >= STANDING  # False where nan
@@ -140,8 +150,19 @@ def instant_evidence(pos: Array, vel: Array, i: Ints, j: Ints, *, others: bool =
         (apart * change).sum(axis=1) / np.maximum(distance, TOUCHING),
         np.where(both, np.arccos(np.clip(cosine, -1.0, 1.0)), np.nan),
         np.where(both, differ, np.nan), np.where(np.isfinite(differ), first != second, np.nan),
-        *near,
+        _file(pos, motion.slope[:, -1], i, j), *near,
     ])  # fmt: skip
+
+
+def _file(pos: Array, way: Array, i: Ints, j: Ints) -> Array:
+    """Returns at how many ends of each pair others go on in file, (R,); way (N, 2): velocities, m/s."""
+    from tracking.grouping.motion_kernels import file_ends
+
+    one, other, out = np.concatenate([i, j]), np.concatenate([j, i]), np.empty(len(i))
+    order = np.argsort(one, kind="stable")
+    begin = np.searchsorted(one[order], np.arange(len(pos) + 1))
+    file_ends(begin, other[order], pos, way, i, j, STANDING, FILE_SPACING, FILE_STRAIGHT, FILE_ALONG, out)
+    return out
 
 
 def _nearer(i: Ints, j: Ints, distance: Array) -> Array:
@@ -176,33 +197,52 @@ def _portions(step: Ints) -> Iterator[slice]:
         low = high
 
 
-class ExponentialMeans:
-    """Means of the quantities of pairs over their rows so far, weighted by exp(-age / time), for each of the `TIMES`.
+class PairMeans:
+    """What pairs have been like so far: means of their quantities and offsets, with weights exp(-age / time).
 
-    total, weight (K, 10, 3): sums by pair, quantity and time. last (K,): step of a pair's last row; rows (K,): number.
+    total, weight (K, 11, 3): sums by pair, quantity and time; offsets (K, 3, 3): sums of x, y and weights by pair and
+    time. last (K,): step of a pair's last row; rows (K,): number of rows.
     """
 
     def __init__(self, pairs: int, seconds: float) -> None:
         self.seconds, self.times = seconds, np.array(TIMES)
         self.total = np.zeros((pairs, len(QUANTITIES), len(TIMES)))
-        self.weight = np.zeros_like(self.total)
+        self.weight, self.offsets = np.zeros_like(self.total), np.zeros((pairs, len(TIMES), 3))
         self.last, self.rows = np.zeros(pairs, np.int64), np.zeros(pairs, np.int64)
 
-    def add(self, step: Ints, pair: Ints, quantities: Array) -> Array:
+    def add(self, step: Ints, pair: Ints, moment: PairMoment) -> Array:
         """Adds R rows, steps ascending, and returns the values (R, len(NAMES)) of each row's pair after this row. step,
-        pair (R,): step and number of the pair; quantities (R, 10): from `instant_evidence`."""
+        pair (R,): step and number of the pair."""
         from tracking.grouping.belief_kernels import add_to_means
+        from tracking.grouping.motion_kernels import add_to_offsets, lengths_in_noise
 
-        out, count = np.empty((*quantities.shape, len(self.times))), np.empty(len(step), np.int64)
-        times = self.times / self.seconds
-        add_to_means(step, pair, quantities, times, self.total, self.weight, self.last, self.rows, out, count)
-        return np.column_stack([out.reshape(len(step), -1), np.minimum(count * self.seconds, LONGEST)])
+        count, many = len(step), len(self.times)
+        times, near = self.times / self.seconds, np.empty(count, np.int64)
+        means, in_noise = np.empty((count, len(QUANTITIES), many)), np.empty((count, len(IN_NOISE)))
+        vectors = np.concatenate([np.empty((count, many, 2)), moment.change], axis=1)
+        add_to_offsets(step, pair, moment.offset, times, self.offsets, self.last, vectors[:, :many])
+        add_to_means(step, pair, moment.quantities, times, self.total, self.weight, self.last, self.rows, means, near)
+        usual = np.repeat(MATES, [many, len(person_motion.TIMES)])
+        lengths_in_noise(vectors, usual, NOISE_SHARES, moment.noise, in_noise)
+        near_time = np.minimum(near * self.seconds, LONGEST)
+        return np.column_stack([means.reshape(count, -1), moment.pace, in_noise, near_time])
 
     def take(self, rows: Ints) -> None:
         """Renumbers the pairs: pair k becomes what was pair rows[k], or a new pair without past if rows[k] is -1."""
         new = rows < 0
-        for name in ("total", "weight", "last", "rows"):
+        for name in ("total", "weight", "offsets", "last", "rows"):
             table = getattr(self, name)
             taken = np.zeros((len(rows), *table.shape[1:]), table.dtype)
             taken[~new] = table[rows[~new]]
             setattr(self, name, taken)
+
+
+def _noise_shares() -> Array:
+    """Returns which share of the positions' variance is in a mean over each of the `TIMES`, and, in 1/s², in a velocity
+    by regression, as in the difference of two such means that lie about half the time apart."""
+    mean, slope = np.array(TIMES), np.array(person_motion.TIMES)
+    share, share_of_slope = (CORRELATION / (CORRELATION + times) for times in (mean, slope))
+    return np.concatenate([share, 4 * share_of_slope / slope**2])
+
+
+NOISE_SHARES = _noise_shares()
