@@ -29,6 +29,7 @@ from scenarios.loading.resolve import resolve
 from sim.types import Array, Bools, Truth
 from tracking.fitting.grouping_scenes import SLOW, simulated
 from tracking.grouping import pair_evidence as pe
+from tracking.grouping.person_motion import STEP, PersonMotion, step_rows
 from tracking.recordings.source import open_source
 
 RUNNER = Path(__file__).parent / "peers" / "run_partners.py"
@@ -52,40 +53,41 @@ def people_of(truth: Truth) -> People:
     group[step, column] = truth.group[kept]
     np.minimum.at(first, column, step)
     np.maximum.at(last, column, step)
-    seen = pe.step_rows(step, column, truth.pos[kept], steps, truth.fps / every)
-    vel, cuts = pe.step_velocities(seen, pe.STEP), np.searchsorted(seen.step, np.arange(steps + 1))
+    seen = step_rows(step, column, truth.pos[kept], steps, truth.fps / every)
+    motion = PersonMotion(people, STEP).add(seen.step, seen.column, seen.pos, seen.time)
+    vel, cuts = motion.vel, np.searchsorted(seen.step, np.arange(steps + 1))
     i, j = np.concatenate([np.add(np.triu_indices(b - a, 1), a) for a, b in pairwise(cuts)], axis=1)
     key, of, count = np.unique(seen.column[i] * people + seen.column[j], return_inverse=True, return_counts=True)
     a, b = key // people, key % people
 
     def seconds(rows: Bools) -> Array:
-        return np.asarray(np.bincount(of, rows, len(key)) * pe.STEP)
+        return np.asarray(np.bincount(of, rows, len(key)) * STEP)
 
-    now = pe.instant_evidence(seen.pos, vel, i, j, others=False)[:, : -len(pe.OTHERS)]
+    now = pe.instant_evidence(seen.pos, motion, i, j, others=False)[:, : -len(pe.OTHERS)]
     now = np.column_stack([now, np.degrees(np.arctan2(now[:, SIDEWAYS], now[:, LENGTHWISE]))])
     least, greatest = (np.full((len(key), now.shape[1]), end) for end in (np.inf, -np.inf))
     np.fmin.at(least, of, now)
     np.fmax.at(greatest, of, now)
     with np.errstate(invalid="ignore"):
-        mean = np.stack([pe.STEP * np.bincount(of, np.nan_to_num(x), len(key)) / seconds(x == x) for x in now.T], 1)
+        mean = np.stack([STEP * np.bincount(of, np.nan_to_num(x), len(key)) / seconds(x == x) for x in now.T], 1)
     a_group, b_group = group[seen.step[i], seen.column[i]], group[seen.step[j], seen.column[j]]
-    partners, near = seconds((a_group >= 0) & (a_group == b_group)) > count * pe.STEP / 2, now[:, 0] < NEAR
+    partners, near = seconds((a_group >= 0) & (a_group == b_group)) > count * STEP / 2, now[:, 0] < NEAR
     neighbour, ends = np.full(people, np.inf), np.r_[a[partners], b[partners]]
     number = np.bincount(ends, minlength=people)
     np.minimum.at(neighbour, ends, np.tile(mean[partners, 0], 2))
-    arrival, departure = (np.abs(end[a] - end[b]) * pe.STEP for end in (first, last))
-    values = np.column_stack([mean, least, greatest, count * pe.STEP, seconds(near), arrival, departure])
-    arrival[np.minimum(first[a], first[b]) * pe.STEP < LEAST] = np.nan
+    arrival, departure = (np.abs(end[a] - end[b]) * STEP for end in (first, last))
+    values = np.column_stack([mean, least, greatest, count * STEP, seconds(near), arrival, departure])
+    arrival[np.minimum(first[a], first[b]) * STEP < LEAST] = np.nan
     pairs = {
         "pairs": np.where(np.isfinite(values), values, np.nan), "partners": partners,
         "two": partners & (np.maximum(number[a], number[b]) == 1), "distance": mean[:, 0], "angle": mean[:, -1],
         "near": least[:, 0] < NEAR, "alike": seconds(near & (now[:, WALKING] < ALIKE)) >= LONG, "arrival": arrival,
     }  # fmt: skip
-    pace, parts = np.hypot(*vel.T), list(pe.evidence(seen, pe.STEP))
+    pace, parts = np.hypot(*vel.T), list(pe.evidence(seen, STEP))
     walked, walking = (np.bincount(seen.column, np.where(pace >= pe.STANDING, x, 0.0), people) for x in (pace, 1.0))
     mates = [(group[x.step, x.a] >= 0) & (group[x.step, x.a] == group[x.step, x.b]) for x in parts]
     return {
-        **{name: x[count * pe.STEP >= LEAST] for name, x in pairs.items()}, "neighbour": neighbour,
+        **{name: x[count * STEP >= LEAST] for name, x in pairs.items()}, "neighbour": neighbour,
         "moments": np.concatenate([np.zeros((0, len(pe.NAMES))), *(x.values for x in parts)]),
         "mates": np.concatenate([np.zeros(0, bool), *mates]),
         "speed": walked[walking > 0] / walking[walking > 0], "view": np.array([len(step) / steps]),

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from sim.rng import rng
-from sim.types import Truth
+from sim.types import Array, Truth
 from tracking.episodes.episode import Episode, Source, SourceCache
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.known_people import people_as_tracks
@@ -61,13 +61,20 @@ def with_label_errors(truth: Truth, errors: LabelErrors, seed: int, repeat: int 
     If the errors are of filmed people, the copy has boxes, displaced in the image, and no positions."""
     assert truth.pos is not None, "simulated people have positions"
     assert truth.box is not None, "scenes have cameras"
-    stay, error = float(np.exp(-1 / (truth.fps * errors.time))), np.empty_like(truth.pos)
-    for id in np.unique(truth.id).tolist():
-        own = np.flatnonzero(truth.id == id)
-        new = np.sqrt(1 - stay**2) * rng(seed, "label", id, repeat=repeat).standard_normal((len(own), 2))
-        new[0] /= np.sqrt(1 - stay**2)  # so that the standard deviation is stationary from the first row on
-        error[own] = errors.sd * lfilter([1.0], [1.0, -stay], new, axis=0)
+    error = errors.sd * unit_errors(truth, errors.time, seed, repeat)
     if not errors.filmed:
         return truth.replace(pos=truth.pos + error)
     moved = np.concatenate([truth.px_per_m * error, np.zeros_like(error)], axis=1)
     return truth.replace(pos=None, vel=None, box=truth.box + moved)
+
+
+def unit_errors(truth: Truth, time: float, seed: int, repeat: int = 0) -> Array:
+    """Returns errors (R, 2) of unit variance for the rows of a truth: per person and coordinate a first-order
+    autoregressive process with the correlation time `time`, s."""
+    stay, error = float(np.exp(-1 / (truth.fps * time))) if time else 0.0, np.empty((len(truth.id), 2))
+    for id in np.unique(truth.id).tolist():
+        own = np.flatnonzero(truth.id == id)
+        new = np.sqrt(1 - stay**2) * rng(seed, "label", id, repeat=repeat).standard_normal((len(own), 2))
+        new[0] /= np.sqrt(1 - stay**2)  # so that the variance is 1 from the first row on
+        error[own] = lfilter([1.0], [1.0, -stay], new, axis=0)
+    return error

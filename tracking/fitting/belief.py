@@ -1,7 +1,8 @@
 """`fit_belief`: fits the belief of who belongs together to simulated scenes, by penalised maximum likelihood.
 
 The weight of a scene is the number of times that it is named; all pairs of a scene have equal weight. The penalty is on
-the squared log-odds and on the curvature of the tables.
+the squared log-odds, on the curvature of the tables and on their differences from one level of noise to the next. The
+share of mates where none is known is that of the least log loss, the threshold that of the greatest F1.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from scipy.optimize import minimize
@@ -18,24 +20,30 @@ from sim.compiler import njit
 from sim.types import Array, Bools, Ints
 from tracking.fitting.grouping_scenes import PairScene
 from tracking.grouping.belief import Belief, Table
+from tracking.grouping.mate_share import MateShare
 from tracking.grouping.pair_evidence import NAMES, NEAR, OTHERS
 
 KNOTS = 6  # Most knots of a table: quantiles of the quantity, evenly spaced from 0.5 to 99.5 %.
-# Weights of the penalties: of curvature, and of squared log-odds.
-CURVED, LARGE = 3e-4, 1e-4
+LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 1.5)  # m: levels of noise.
+# Weights of the penalties: of curvature, of squared log-odds, and of squared differences between levels.
+CURVED, LARGE, UNLIKE = 5e-5, 1.7e-5, 1e-4
 STEPS = 200  # Most iterations.
+SHARES = tuple(0.02 * k for k in range(1, 13))  # Of mates, of which one is chosen.
 THRESHOLDS = 100  # Evenly spaced probabilities, of which the threshold is one.
 
 
 @dataclass(frozen=True)
 class PairSample:
-    """R rows of pairs of all scenes. values (R, len(NAMES)): quantities; together (R,): True if the two are in one true
-    group; weight (R,): sum 1, equal for all pairs of a scene, in proportion to the scenes' weights; scene (R,): number
-    of the scene, from 0."""
+    """R rows of pairs of all scenes. values (R, len(NAMES)): quantities; noise (R,): of positions, m; together (R,):
+    True if the two are in one true group; weight (R,): sum 1, equal for all pairs of a scene, in proportion to the
+    scenes' weights; pair, step (R,): of the scene; scene (R,): number of the scene, from 0."""
 
     values: np.ndarray
+    noise: Array
     together: Bools
     weight: Array
+    pair: Ints
+    step: Ints
     scene: Ints
     pairs: int  # number of pairs
 
@@ -46,9 +54,10 @@ def sample_of(scenes: Sequence[PairScene]) -> PairSample:
         remedy = "name scenarios with people who meet"
         raise InputError(place="fit grouping", got="no two people within 4 m", expected="pairs", remedy=remedy)
     weight = np.concatenate([_weights(s.pair) * s.weight for s in scenes]) / sum(s.weight for s in scenes)
-    values, together = (np.concatenate([getattr(s, name) for s in scenes]) for name in ("values", "together"))
+    names = ("values", "noise", "together", "pair", "step")
+    values, noise, together, pair, step = (np.concatenate([getattr(s, name) for s in scenes]) for name in names)
     scene = np.repeat(np.arange(len(scenes)), [len(s.pair) for s in scenes])
-    return PairSample(values, together, weight, scene, sum(len(np.unique(s.pair)) for s in scenes))
+    return PairSample(values, noise, together, weight, pair, step, scene, sum(len(np.unique(s.pair)) for s in scenes))
 
 
 def _weights(pair: Ints) -> Array:
@@ -66,32 +75,55 @@ def fit_belief(now: PairSample, events: PairSample | None = None, used: Sequence
     knots_of = {name: at for name, at in knots_of.items() if len(at) > 1}
     columns = np.stack([_fit_column(now, knots_of, OTHERS), _fit_column(events or now, knots_of, NEAR)])
     cuts = np.cumsum([len(knots) for knots in knots_of.values()])
-    *heights, bias = np.split(columns, cuts, axis=1)
+    *heights, bias = np.split(columns, cuts, axis=2)
     tables = tuple(Table(*row) for row in zip(knots_of, knots_of.values(), heights, strict=True))
-    belief = Belief(tables, bias[:, 0])
-    return replace(belief, threshold=best_threshold(now, belief.log_odds(now.values)[:, 0]))
+    belief = Belief(tables, np.array(LEVELS), bias[..., 0])
+    log_odds = belief.log_odds(now.values, now.noise)[:, 0]
+    shifted = {share: log_odds + shifts_of_sample(now, log_odds, share) for share in SHARES}
+    share = min(SHARES, key=lambda share: log_loss(now, shifted[share]))
+    return replace(belief, share=share, threshold=best_threshold(now, shifted[share]))
+
+
+def log_loss(sample: PairSample, log_odds: Array) -> float:
+    """Returns the weighted log loss of beliefs (R,) of the sample's rows."""
+    return float(sample.weight @ (np.logaddexp(0.0, log_odds) - log_odds * sample.together))
+
+
+def shifts_of_sample(sample: PairSample, log_odds: Array, share: float) -> Array:
+    """Returns by how much the share of mates seen so far shifts the log-odds (R,), in each scene by itself."""
+    out, cuts = np.empty(len(log_odds)), np.flatnonzero(np.diff(sample.scene, prepend=-1, append=-1))
+    for low, high in pairwise(cuts):
+        order = low + np.argsort(sample.step[low:high], kind="stable")
+        out[order] = MateShare(share).add(sample.step[order], sample.pair[order], log_odds[order])
+    return out
 
 
 def _fit_column(sample: PairSample, knots_of: Mapping[str, Array], left_out: tuple[str, ...]) -> Array:
-    """Returns the log-odds at all knots, 0 at those of left out quantities, and the bias as the last number."""
+    """Returns the log-odds (L, K + 1) at all knots by level, 0 at those of left out quantities, the bias last."""
     kept = {name: at for name, at in knots_of.items() if not name.startswith(left_out)}
-    at = list(kept.values())
+    at, levels = list(kept.values()), len(LEVELS)
     place, part = _places(sample.values[:, [NAMES.index(name) for name in kept]], at)
-    curves = _curvature(at)
+    (level,), (more,) = (x.T for x in _places(sample.noise[:, None], [np.array(LEVELS)]))
+    curves, knots = _curvature(at), sum(map(len, at))
     bends = curves.T @ curves
 
     def objective(x: Array) -> tuple[float, Array]:
-        heights, slopes = x[:-1], np.zeros_like(x)
-        loss, slopes[-1] = loss_and_gradient(place, part, sample.together, sample.weight, heights, x[-1], slopes[:-1])
-        slopes[:-1] += 2 * CURVED * bends @ heights + 2 * LARGE * heights
-        return loss + CURVED * float(heights @ bends @ heights) + LARGE * float(heights @ heights), slopes
+        heights, slopes = x.reshape(levels, -1), np.zeros((levels, knots + 1))
+        loss = loss_and_gradient(place, part, level, more, sample.together, sample.weight, heights, slopes)
+        inner, steps = heights[:, :-1], np.diff(heights, axis=0)
+        slopes[:, :-1] += 2 * CURVED * inner @ bends + 2 * LARGE * inner
+        slopes[1:] += 2 * UNLIKE * steps
+        slopes[:-1] -= 2 * UNLIKE * steps
+        loss += CURVED * float(((inner @ bends) * inner).sum()) + LARGE * float((inner * inner).sum())
+        return loss + UNLIKE * float((steps * steps).sum()), slopes.ravel()
 
-    start = np.append(np.zeros(sum(map(len, at))), -2.0)
+    start = np.zeros((levels, knots + 1))
+    start[:, -1] = -2.0
     options = {"maxiter": STEPS, "maxcor": 20}
-    found = minimize(objective, start, jac=True, method="L-BFGS-B", options=options).x
+    found = minimize(objective, start.ravel(), jac=True, method="L-BFGS-B", options=options).x
     fitted = np.repeat([name in kept for name in knots_of], [len(at) for at in knots_of.values()])
-    column = np.zeros(len(fitted) + 1)
-    column[np.append(fitted, True)] = found
+    column = np.zeros((levels, len(fitted) + 1))
+    column[:, np.append(fitted, True)] = found.reshape(levels, -1)
     return column
 
 
@@ -146,30 +178,38 @@ def _curvature(at: Sequence[Array]) -> Array:
 
 @njit(cache=True)
 def loss_and_gradient(
-    place: np.ndarray, part: np.ndarray, together: Bools, weight: Array, heights: Array, bias: float, gradient: Array
-) -> tuple[float, float]:
-    """Returns the weighted log loss of R rows and its slope with respect to the bias; adds to gradient (K,).
+    place: np.ndarray, part: np.ndarray, level: np.ndarray, more: np.ndarray, together: Bools, weight: Array,
+    heights: Array, gradient: Array,
+) -> float:  # fmt: skip
+    """Returns the weighted log loss of R rows; adds its slopes to gradient (L, K + 1).
 
-    place, part (R, Q): knot below each value, -1 if unknown, and how far it is to the next. heights (K,): log-odds at
-    all knots.
+    place, part (R, Q): knot below each value, -1 if unknown, and how far it is to the next. level, more (R,): the same
+    of the noise. heights (L, K + 1): log-odds at all knots by level, the bias last.
     """
     rows, quantities = place.shape
-    loss, slopes = 0.0, 0.0
+    loss, bias = 0.0, heights.shape[1] - 1
     for r in range(rows):
-        log_odds = bias
+        low, v = level[r], more[r]
+        below, above = heights[low], heights[low + 1]
+        log_odds = (1 - v) * below[bias] + v * above[bias]
         for q in range(quantities):
             k = place[r, q]
             if k >= 0:
                 u = part[r, q]
-                log_odds += (1 - u) * heights[k] + u * heights[k + 1]
+                log_odds += (1 - v) * ((1 - u) * below[k] + u * below[k + 1])
+                log_odds += v * ((1 - u) * above[k] + u * above[k + 1])
         true = 1.0 if together[r] else 0.0
         loss += weight[r] * (np.log1p(np.exp(-abs(log_odds))) + max(log_odds, 0.0) - true * log_odds)
         slope = weight[r] * (1 / (1 + np.exp(-log_odds)) - true)
-        slopes += slope
+        lower, upper = gradient[low], gradient[low + 1]
+        lower[bias] += slope * (1 - v)
+        upper[bias] += slope * v
         for q in range(quantities):
             k = place[r, q]
             if k >= 0:
                 u = part[r, q]
-                gradient[k] += slope * (1 - u)
-                gradient[k + 1] += slope * u
-    return loss, slopes
+                lower[k] += slope * (1 - v) * (1 - u)
+                lower[k + 1] += slope * (1 - v) * u
+                upper[k] += slope * v * (1 - u)
+                upper[k + 1] += slope * v * u
+    return loss

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.types import Array, Bools
-from tracking.fitting.belief import PairSample
+from tracking.fitting.belief import PairSample, log_loss
 
 BINS = 15  # Of equal width, between the probabilities 0 and 1.
 
@@ -14,12 +14,11 @@ def belief_scores(sample: PairSample, log_odds: Array) -> dict[str, float]:
     """Returns "pairs" (their number), "log loss", "calibration error" and "F1" (at a probability above 1/2) of beliefs.
     log_odds (R,): the beliefs of the sample's rows. F1 is nan without any pair together on either side."""
     true, weight = sample.together, sample.weight
-    loss = np.logaddexp(0.0, log_odds) - log_odds * true
     bins = reliability(log_odds, true, weight)
     hits, count = int((true & (log_odds > 0)).sum()), int(true.sum() + (log_odds > 0).sum())
     return {
         "pairs": float(sample.pairs),
-        "log loss": float(weight @ loss),
+        "log loss": log_loss(sample, log_odds),
         "calibration error": float(np.abs(bins[:, 0] * (bins[:, 1] - bins[:, 2]))[bins[:, 0] > 0].sum()),
         "F1": 2 * hits / count if count else float("nan"),
     }

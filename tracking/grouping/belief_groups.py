@@ -15,7 +15,7 @@ from sim.truth.merge_split_rules import frames_of, runs, stretches
 from sim.types import Array, Bools, Ints
 from tracking.grouping.belief import UNSEEN, Belief, PairBeliefs, pair_beliefs
 from tracking.grouping.link_rule import CELLS, Links
-from tracking.grouping.pair_evidence import frames_per_step, step_rows
+from tracking.grouping.person_motion import frames_per_step, step_rows
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,4 +1,4 @@
-"""Numba kernels of the belief, in the order of its steps: evidence of pairs, sums of tables, partition into groups.
+"""Numba kernels of the belief, in the order of its steps: evidence of pairs, sums of tables, share of mates, partition.
 
 Evidence: exponential means over a pair's rows. Partition: average linkage in each step, with a memory of the step
 before.
@@ -42,27 +42,70 @@ def add_to_means(
 
 
 @njit(cache=True)
-def table_sums(values: Array, bias: Array, column: Ints, cut: Ints, at: Array, heights: Array) -> Array:
-    """Returns the beliefs (R, D) of quantities (R, Q): bias plus what each table says, 0 where a quantity is unknown.
+def table_sums(
+    values: Array, noise: Array, levels: Array, bias: Array, column: Ints, cut: Ints, at: Array, heights: Array
+) -> Array:
+    """Returns the beliefs (R, D) of quantities (R, Q) at noise (R,): bias plus what each table says, 0 where a quantity
+    is unknown.
 
-    bias (D,). cut (T + 1,): where the knots of each table begin in at (N,) and heights (D, N).
+    levels (L,), bias (D, L). cut (T + 1,): where the knots of each table begin in at (N,) and heights (D, L, N).
     """
     out = np.empty((len(values), len(bias)))
     for r in range(len(values)):
+        low, more = _place(levels, 0, len(levels), noise[r])
         for d in range(len(bias)):
-            out[r, d] = bias[d]
+            out[r, d] = (1 - more) * bias[d, low] + more * bias[d, low + 1]
         for t in range(len(column)):
             x = values[r, column[t]]
             if not np.isnan(x):
-                k, last = cut[t], cut[t + 1] - 1
-                while k < last and at[k + 1] <= x:
-                    k += 1
-                part = (x - at[k]) / (at[k + 1] - at[k]) if x > at[k] and k < last else 0.0
+                k, part = _place(at, cut[t], cut[t + 1], x)
                 for d in range(len(bias)):
-                    out[r, d] += heights[d, k]
-                    if part > 0:
-                        out[r, d] += part * (heights[d, k + 1] - heights[d, k])
+                    below, above = heights[d, low], heights[d, low + 1]
+                    out[r, d] += (1 - more) * (below[k] + part * (below[k + 1] - below[k]))
+                    out[r, d] += more * (above[k] + part * (above[k + 1] - above[k]))
     return out
+
+
+@njit(cache=True)
+def _place(at: Array, first: int, end: int, x: float) -> tuple[int, float]:
+    """Returns the knot k of at[first:end] below x, at most the last but one, and which part of the way to the next x
+    lies, 0 to 1."""
+    k = first
+    while k < end - 2 and at[k + 1] <= x:
+        k += 1
+    return k, min(max((x - at[k]) / (at[k + 1] - at[k]), 0.0), 1.0)
+
+
+@njit(cache=True)
+def shifts_of_share(
+    step: Ints, pair: Ints, log_odds: Array, middle: Array, share: float, weight: float, latest: Ints, counts: Array,
+    shift: Array, out: Array,
+) -> None:  # fmt: skip
+    """Counts each pair by its latest log-odds, and writes for each row (R,) by how much the log-odds of its step are to
+    be shifted, out (R,).
+
+    middle (B,): log-odds of the bins, evenly spaced. share, weight: share of mates where no pair is known, and as how
+    many pairs it counts. State: latest (K,), bins of pairs, -1 for none; counts (B,); shift (1,).
+    """
+    low, width, usual = 0, middle[1] - middle[0], np.log(share / (1 - share))
+    while low < len(step):
+        high = low
+        while high < len(step) and step[high] == step[low]:
+            bin = int(min(max(np.floor((log_odds[high] - middle[0]) / width + 0.5), 0.0), len(middle) - 1.0))
+            if latest[pair[high]] >= 0:
+                counts[latest[pair[high]]] -= 1
+            counts[bin] += 1
+            latest[pair[high]] = bin
+            high += 1
+        for _ in range(2):  # the steps themselves are iterations, too
+            mates, pairs = weight * share, weight
+            for b in range(len(middle)):
+                if counts[b] > 0:
+                    mates += counts[b] / (1 + np.exp(-middle[b] - shift[0]))
+                    pairs += counts[b]
+            shift[0] = np.log(mates / (pairs - mates)) - usual
+        out[low:high] = shift[0]
+        low = high
 
 
 @njit(cache=True)

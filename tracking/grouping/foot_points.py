@@ -1,9 +1,8 @@
 """Boxes that are tracked in the image, as people on the ground: `standing` moves the tracks to where the boxes stand,
 and `completed` derives groups and events there. The ground is that of the camera, or of the boxes (`ground_of_boxes`).
 
-Distances between people are those of the ground, in m, and not px divided by one scale for near and far people. In
-depth they count as precisely as boxes measure them (`as_measured`), also if the tracker itself reports the feet of its
-boxes on the ground. Boxes in the image from pixels are never moved, as the foot of a blob is no person's.
+Distances between people are those of the ground, in m, and not px divided by one scale for near and far people. Boxes
+in the image from pixels are never moved, as the foot of a blob is no person's.
 """
 
 from __future__ import annotations
@@ -27,10 +26,7 @@ from tracking.grouping.grouped_tracks import (
 )
 from tracking.grouping.grouping_choice import Grouping
 
-FLATTENED = 0.4  # k of `as_measured`: of 0 to 1, about the greatest F1 of groups and pairs from 5 to 60 degrees above.
-OVERHEAD = 1e-6  # Level part of the axis of a camera that looks straight down.
-# Planes in which the feet of boxes measure where people are, by the tracker's input; of other inputs: the image.
-PLANES = {"boxes": ("image", "ground"), "pixels": ("ground",), "stereo": ()}
+FEETLESS = ("pixels", "stereo")  # Inputs of trackers whose boxes do not end at people's feet.
 
 
 def plane_of_run(tracks: Sequence[Tracks]) -> str | None:
@@ -52,11 +48,11 @@ def source_of(run: Iterable[Tracks] | None) -> str | None:
 def can_stand(tracks: Sequence[Tracks], camera: Camera | None, source: str | None = None) -> bool:
     """Returns True if tracks can be moved from the image to the ground: people with boxes, a camera, no pictures.
     source: as in `completed`."""
-    return plane_of_run(tracks) == "image" and camera is not None and _stand(tracks, source)
+    return camera is not None and _stand(tracks, source)
 
 
 def _stand(tracks: Sequence[Tracks], source: str | None) -> bool:
-    return plane_of_run(tracks) in PLANES.get(source or "", ("image",)) and boxed(tracks)
+    return plane_of_run(tracks) == "image" and source not in FEETLESS and boxed(tracks)
 
 
 def ground_below(
@@ -66,30 +62,13 @@ def ground_below(
     """Returns the ground on which the boxes of tracks stand: by the camera if known, else by the first boxes.
 
     source: as in `completed`. The boxes are used only if the tracker names no groups. The ground is unknown for tracks
-    that lack boxes, lie in the image and come from pictures, or lie on the ground and come from neither boxes nor
-    pixels.
+    that lack boxes, come from pictures, or lie on the ground.
     """
     if not _stand(tracks, source):
         return Ground()
-    if camera is not None or plane_of_run(tracks) == "ground" or names_groups(tracks):
+    if camera is not None or names_groups(tracks):
         return Ground(camera)
     return ground_of_boxes(tracks, px_per_m, image_size)
-
-
-def as_measured(pos: Array, camera: Camera) -> Array:
-    """Returns ground points (N, 2), m, to the right and ahead of the camera, with depths shortened by uncertainty.
-
-    A box foot that is e m too low or high at the person is wrong by e y / C in depth, at the depth y from a camera of
-    height C. So a length dy in depth becomes dy / sqrt(1 + (k y / C)^2). For a camera that looks straight down, `pos`
-    is returned unchanged.
-    """
-    level = float(np.hypot(*camera.rotation[2, :2]))
-    if camera.kind == "top" or level < OVERHEAD:
-        return pos
-    x, y = camera.rotation[2, :2] / level
-    along, side = ((pos - camera.position[:2]) @ direction for direction in ([x, y], [y, -x]))
-    reach = camera.position[2] / FLATTENED
-    return np.column_stack([side, reach * np.arcsinh(along / reach)])
 
 
 def completed(
@@ -108,11 +87,7 @@ def completed(
     if ground.camera is None:
         return with_groups(tracks, fps, px_per_m, rule, objective=objective), ground
     stairs = None if camera is None else scene  # the boxes tell no place in the scene
-    in_image = plane_of_run(tracks) == "image"
-    feet = (
-        standing_points(_boxes(tracks), ground.camera, stairs) if in_image else np.concatenate([t.pos for t in tracks])
-    )
-    places = as_measured(feet, ground.camera)
+    places = standing_points(_boxes(tracks), ground.camera, stairs)
     _, labels, events = labels_and_events(tracks, fps, 1.0, rule, objective=objective, places=places)
     there = [moved_events(new, t.id, t.pos) for t, new in zip(tracks, events, strict=True)]
     return tuple(filled(with_velocities(tracks, fps), labels, there, objective=objective)), ground

@@ -6,14 +6,14 @@ for a whole sequence.
 
 from __future__ import annotations
 
-from collections import deque
-
 import numpy as np
 
 from sim.truth.merge_split_rules import close_pairs
 from sim.types import Array, Bools, Ints
 from tracking.grouping.belief import DECISIONS, NOW, UNSEEN, default_belief
-from tracking.grouping.pair_evidence import CHORD, REACH, ExponentialMeans, frames_per_step, instant_evidence
+from tracking.grouping.mate_share import MateShare
+from tracking.grouping.pair_evidence import REACH, PairMeans, pair_moment
+from tracking.grouping.person_motion import PersonMotion, frames_per_step
 
 PAIR = 2**31  # Numbers of people are below this.
 
@@ -25,10 +25,10 @@ class PairBelief:
 
     State: log_odds (K, K), of the last step, or for a new person of the person's first frame; it is UNSEEN for pairs
     4 m or more apart, and if one of the two was not seen in the last step. total (K, 3), sums of x, y, m, and of time,
-    s, over the frames of the current step in which a person was seen; count (K,), the number of these frames. past, for
-    each of the last steps the means of x, y and time, (K, 3), nan if not seen. number (K,), a number of each person
-    that is never used again. means, the averaged evidence of R pairs that have been near each other; pair (R,), the key
-    of each, PAIR times the one number plus the other. frames, steps: how many there were.
+    s, over the frames of the current step in which a person was seen; count (K,), the number of these frames. motion,
+    of the people; there (K,), who was seen in the last step. number (K,), a number of each person that is never used
+    again. means, the averaged evidence of R pairs that have been near each other, and share, of mates among them; pair
+    (R,), the key of each, PAIR times the one number plus the other. frames, steps: how many there were.
     """
 
     def __init__(self, fps: float, decision: str = NOW) -> None:
@@ -36,11 +36,11 @@ class PairBelief:
         self.fps, self.size = fps, frames_per_step(fps)
         self.seconds = self.size / fps
         self.frames = self.steps = 0
-        self.past: deque[Array] = deque(maxlen=1 + max(1, round(CHORD / self.seconds)))
-        self.log_odds = np.zeros((0, 0))
+        self.log_odds, self.there = np.zeros((0, 0)), np.zeros(0, bool)
         self.total, self.count = np.zeros((0, 3)), np.zeros(0)
         self.number, self.people, self.pair = np.zeros(0, np.int64), 0, np.zeros(0, np.int64)
-        self.means = ExponentialMeans(0, self.seconds)
+        self.motion, self.means = PersonMotion(0, self.seconds), PairMeans(0, self.seconds)
+        self.share = MateShare(default_belief().share) if decision == NOW else None
 
     def add(self, state: Array) -> None:
         """Adds new people after those known so far, in the rows of `state` that exceed the number of known people.
@@ -53,9 +53,11 @@ class PairBelief:
         fresh = np.flatnonzero(new[j])
         if len(fresh):
             # new people have no past: the evidence of this moment stands for all times
-            means = ExponentialMeans(len(fresh), self.seconds)
-            now = instant_evidence(state[:, :2], state[:, 2:], i, j, others=self.others)[fresh]
-            self._judge(i[fresh], j[fresh], means.add(np.zeros(len(fresh), np.int64), np.arange(len(fresh)), now))
+            motion, means = self.motion.new(state[:, 2:]), PairMeans(len(fresh), self.seconds)
+            moment = pair_moment(state[:, :2], motion, i, j, others=self.others).rows(fresh)
+            values = means.add(np.zeros(len(fresh), np.int64), np.arange(len(fresh)), moment)
+            log_odds = default_belief().log_odds(values, moment.noise_level)[:, self.column]
+            self._judge(i[fresh], j[fresh], log_odds + (0.0 if self.share is None else self.share.shift[0]))
 
     def keep(self, rows: Bools) -> None:
         """Removes all people except those where `rows` (K,) is True."""
@@ -72,31 +74,28 @@ class PairBelief:
 
     def seen(self) -> Bools:
         """Returns which people were seen in the last complete step, (K,) bool; all False if there is none yet."""
-        none = np.zeros(len(self.count), bool)
-        return np.isfinite(self.past[-1][:, 0]) if self.past else none
+        return self.there
 
     def _end_step(self) -> None:
-        n = len(self.count)
-        now = np.full((n, 3), np.nan)
-        np.divide(self.total, self.count[:, None], out=now, where=self.count[:, None] > 0)
-        self.past.append(now)
+        n, self.there = len(self.count), self.count > 0
+        seen = np.flatnonzero(self.there)
+        now = self.total[seen] / self.count[seen, None]
         self.total, self.count = np.zeros((n, 3)), np.zeros(n)
         pos = now[:, :2]
-        vel = np.full((n, 2), np.nan)
-        for before in list(self.past)[-2::-1]:
-            chord = (pos - before[:, :2]) / (now[:, 2] - before[:, 2])[:, None]
-            np.copyto(vel, chord, where=np.isfinite(chord))
+        motion = self.motion.add(np.full(len(seen), self.steps), seen, pos, now[:, 2])
         self.log_odds[:] = UNSEEN
-        i, j = self._pairs(pos)
+        i, j = close_pairs(np.zeros(len(seen), np.int64), pos, REACH)
         if len(i):
-            step = np.full(len(i), self.steps)
-            values = instant_evidence(pos, vel, i, j, others=self.others)
-            self._judge(i, j, self.means.add(step, self._rows(i, j), values))
+            moment, step = pair_moment(pos, motion, i, j, others=self.others), np.full(len(i), self.steps)
+            i, j = seen[i], seen[j]
+            pair = self._rows(i, j)
+            log_odds = default_belief().log_odds(self.means.add(step, pair, moment), moment.noise_level)[:, self.column]
+            self._judge(i, j, log_odds if self.share is None else log_odds + self.share.add(step, pair, log_odds))
         self.steps += 1
 
-    def _judge(self, i: Ints, j: Ints, values: Array) -> None:
-        """Sets the log-odds of the pairs i, j (R,)."""
-        self.log_odds[i, j] = self.log_odds[j, i] = default_belief().log_odds(values)[:, self.column]
+    def _judge(self, i: Ints, j: Ints, log_odds: Array) -> None:
+        """Sets the log-odds (R,) of the pairs i, j (R,)."""
+        self.log_odds[i, j] = self.log_odds[j, i] = log_odds
 
     def _pairs(self, pos: Array) -> tuple[Ints, Ints]:
         seen = np.flatnonzero(np.isfinite(pos[:, 0]))
@@ -117,7 +116,8 @@ class PairBelief:
 
         self.log_odds = square(self.log_odds, 0.0)
         self.total, self.count = rows(self.total, 0.0), rows(self.count, 0.0)
-        self.past = deque((rows(p, np.nan) for p in self.past), self.past.maxlen)
+        self.there = np.append(self.there, False)[old]
+        self.motion.take(old)
         count = int(new.sum())
         number = np.append(self.number, self.people)[old]
         number[new] = self.people + np.arange(count)
@@ -125,7 +125,7 @@ class PairBelief:
         there = np.isin(self.pair // PAIR, number) & np.isin(self.pair % PAIR, number)
         if not there.all():
             self.pair = self.pair[there]
-            self.means.take(np.flatnonzero(there))
+            self._take_pairs(np.flatnonzero(there))
 
     def _rows(self, i: Ints, j: Ints) -> Ints:
         """Returns the rows (R,) of the pairs i < j in `means`; adds those that are not there."""
@@ -135,5 +135,10 @@ class PairBelief:
             rows = np.full(len(every), -1)
             rows[np.searchsorted(every, self.pair)] = np.arange(len(self.pair))
             self.pair = every
-            self.means.take(rows)
+            self._take_pairs(rows)
         return np.searchsorted(self.pair, pair)
+
+    def _take_pairs(self, rows: Ints) -> None:
+        self.means.take(rows)
+        if self.share is not None:
+            self.share.take(rows)

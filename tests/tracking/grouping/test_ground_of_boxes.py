@@ -14,10 +14,10 @@ from sim.scene.body import person_boxes
 from sim.scene.camera import camera_rotation
 from sim.types import Camera, Tracks
 from tracking.grouping import foot_points
-from tracking.grouping.foot_points import as_measured, ground_below
+from tracking.grouping.foot_points import ground_below
 from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
 from tracking.grouping.grouped_tracks import without_groups
-from tracking.running.run import TrackingRun, grouped
+from tracking.running.run import grouped
 
 
 @pytest.mark.parametrize(
@@ -42,8 +42,6 @@ def test_ground_is_that_of_the_camera_or_unknown(tilt: float, height: float, kno
         assert sized is not None
         assert (sized.image, sized.focal_px[0]) == ((640, 480), pytest.approx(704))
         assert [found.position[2] / height, *found.rotation[2]] == pytest.approx([1, *view[2]], abs=0.15)
-        far = as_measured(np.array([[0.0, 1000.0], [0.0, 1001.0]]), camera)
-        assert far[1, 1] - far[0, 1] == pytest.approx(height / (0.4 * 1000), rel=0.01)
 
 
 def test_the_size_of_the_picture_is_the_sequences(monkeypatch) -> None:
@@ -61,22 +59,3 @@ def test_a_ground_that_is_refused_depends_on_its_boxes_too() -> None:
     rows = (np.arange(60), np.full(60, -1), same[:, :2], same[:, :2], np.zeros((60, 4, 4)), same)
     found = ground_of_boxes([Tracks(k, 0.0, "image", "person", *rows) for k in range(1, 9)], 12.0)
     assert (found.camera, found.frames) == (None, 5)
-
-
-def test_depth_by_a_camera_that_is_turned_about_its_axis() -> None:
-    pos = np.array([[1.0, 5.0], [9.0, 5.0], [1.0, 8.0]])
-    for view in (camera_rotation(0.5, 0.0), camera_rotation(0.5, 0.0)[[1, 0, 2]] * [[-1], [1], [1]]):
-        camera = Camera("pinhole", (640, 480), (700.0, 700.0), (320.0, 240.0), np.array([0.0, 0.0, 6.0]), view)
-        moved = as_measured(pos, camera)
-        assert np.hypot(*(moved[1] - moved[0])) == pytest.approx(8)
-        assert np.hypot(*(moved[2] - moved[0])) == pytest.approx(2.7, abs=0.2)
-
-
-def test_feet_that_the_tracker_reports_count_as_measured_by_what_it_worked_on() -> None:
-    scene = sim.simulate(scenarios.load("cross", set=["camera.fps=5", "camera.tilt_deg=15"]), 30_000, streams=())
-    run = tracking.track("blob", scene, detections="file")
-    bare = tuple(without_groups(run))
-    given = (run, *(TrackingRun(bare, {"input": kind}) for kind in ("boxes", "pixels", "points")), bare)
-    a, b, c, d, e = ([(t.group.tolist(), t.groups.pos.tolist()) for t in grouped(one, scene)] for one in given)
-    assert a == b == c != d == e
-    assert (run[0].plane, run.info["ground"]) == ("ground", "camera")

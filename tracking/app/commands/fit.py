@@ -54,7 +54,7 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
 def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     """Writes the belief fitted to simulated scenes as a TOML file, with the command and its scores as comments."""
     from sim.store.atomic import write_file
-    from tracking.fitting.belief import fit_belief, sample_of
+    from tracking.fitting.belief import fit_belief, sample_of, shifts_of_sample
     from tracking.fitting.belief_scores import belief_scores
     from tracking.fitting.grouping_scenes import pair_scenes
 
@@ -62,7 +62,8 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     sample = sample_of(list(pair_scenes(options.names, seeds)))
     changes = sample_of(list(pair_scenes(options.events, seeds))) if options.events else None
     belief = fit_belief(sample, changes)
-    scores = belief_scores(sample, belief.log_odds(sample.values)[:, 0])
+    log_odds = belief.log_odds(sample.values, sample.noise)[:, 0]
+    scores = belief_scores(sample, log_odds + shifts_of_sample(sample, log_odds, belief.share))
     asked = [word for name in options.events for word in ("--events", name)]
     comments = _comments("grouping", options, asked, scores)
     write_file(out, belief.toml_text("\n".join(comments)).encode())
