@@ -8,26 +8,96 @@ from itertools import combinations
 import numpy as np
 
 TIMES = (0.8, 5.0, 15.0)
+SLOPES = (1.5, 4.0)
 
 
 def evidence(pos, time, seconds):
-    """dict from (step, a, b) to the dict of quantities; pos (S, P, 2), time (S, P), nan where not seen."""
+    """dict from (step, a, b) to the dict of quantities and "noise"; pos (S, P, 2), time (S, P), nan where not seen."""
     steps, people = pos.shape[:2]
     seen = [[p for p in range(people) if np.isfinite(pos[t, p, 0])] for t in range(steps)]
-    past, found = {}, {}
+    past, offsets, found = {}, {}, {}
+    noise = noises(pos, time, seen)
     for t in range(steps):
         vel = {p: chord(pos, time, t, p, seconds) for p in seen[t]}
+        slope = {(p, span): regression(pos[: t + 1, p], time[: t + 1, p], span) for p in seen[t] for span in SLOPES}
         for a, b in combinations(seen[t], 2):
             if np.hypot(*(pos[t, b] - pos[t, a])) < 4.0:
-                past.setdefault((a, b), []).append((t, instant(pos[t], vel, a, b) | others(pos[t], vel, a, b)))
+                row = instant(pos[t], vel, a, b) | {"file": file(pos[t], slope, a, b, seen[t])}
+                past.setdefault((a, b), []).append((t, row | others(pos[t], vel, a, b)))
+                offsets.setdefault((a, b), []).append((t, pos[t, b] - pos[t, a]))
                 row = {
                     f"{name}, {time:g} s": mean(past[a, b], name, t, time, seconds)
                     for name in past[a, b][0][1]
                     for time in TIMES
                 }
+                error = noise[t, a] + noise[t, b]
+                for span in SLOPES:
+                    one, other = slope[a, span], slope[b, span]
+                    row[f"pace, {span:g} s"] = np.hypot(*(one + other)) / 2
+                    share = 4 / (1 + span) / span**2
+                    row[f"velocity difference in noise, {span:g} s"] = length_in(other - one, 0.25, share * error)
+                for span in TIMES:
+                    weights = np.array([math.exp(-(t - s) * seconds / span) for s, _ in offsets[a, b]])
+                    middle = weights @ [x for _, x in offsets[a, b]] / weights.sum()
+                    row[f"offset in noise, {span:g} s"] = length_in(middle, 0.6, error / (1 + span))
                 row["time near"] = min(len(past[a, b]) * seconds, 20.0)
+                row["noise"] = math.sqrt(max(np.trace(error), 0.0) / 2)
                 found[t, a, b] = row
     return found
+
+
+def regression(pos, time, span):
+    """Slope of the weighted least squares line through what was seen up to now, nan for one position."""
+    known = np.isfinite(pos[:, 0])
+    if known.sum() < 2:
+        return np.full(2, math.nan)
+    weights = np.exp((time[known] - time[known][-1]) / span)
+    return np.polyfit(time[known] - time[known][-1], pos[known], 1, w=np.sqrt(weights))[0]
+
+
+def noises(pos, time, seen):
+    """dict from (step, person) to the covariance (2, 2) of the person's positions."""
+    all_sum, all_count = 0.01 * np.eye(2) * 10, 10.0
+    own, found = {}, {}
+    for t, people in enumerate(seen):
+        for p in people:
+            own.setdefault(p, (np.zeros((2, 2)), 0.0))
+            if t >= 2 and p in seen[t - 1] and p in seen[t - 2]:
+                (x2, x1, x), (t2, t1, now) = pos[t - 2 : t + 1, p], time[t - 2 : t + 1, p]
+                off = x - x1 - (x1 - x2) * (now - t1) / (t1 - t2)
+                off *= min(1.0, 4.0 / max(np.hypot(*off), 1e-9))
+                span = (now - t2) / 2
+                r = math.exp(-span)
+                new = (np.outer(off, off) - np.eye(2) * (0.5 * span**2) ** 2) / (6 - 8 * r + 2 * r**2)
+                fade = math.exp(-span / 20)
+                own[p] = own[p][0] * fade + new, own[p][1] * fade + 1
+                all_sum, all_count = all_sum + new, all_count + 1
+        for p in people:
+            found[t, p] = (20 * all_sum / all_count + own[p][0]) / (20 + own[p][1])
+    return found
+
+
+def length_in(vector, usual, error):
+    """Mahalanobis length; error (2, 2): made a covariance where it is none."""
+    var = np.maximum(np.diag(error), 0.0)
+    most = math.sqrt(var[0] * var[1])
+    cov = np.diag(var) + np.array([[0.0, 1.0], [1.0, 0.0]]) * min(max(error[0, 1], -most), most)
+    return math.sqrt(vector @ np.linalg.inv(cov + usual**2 * np.eye(2)) @ vector)
+
+
+def file(pos, slope, a, b, seen):
+    """At how many ends of the pair somebody goes on in line along their way."""
+    apart, way = pos[b] - pos[a], (slope[a, 4.0] + slope[b, 4.0]) / 2
+    if not np.hypot(*way) >= 0.3 or not np.hypot(*apart) < 1.8:
+        return math.nan
+    if abs(apart @ way) < 0.8 * np.hypot(*apart) * np.hypot(*way):
+        return 0.0
+
+    def goes_on(end, line):
+        steps = [pos[p] - pos[end] for p in seen if p not in (a, b)]
+        return any(np.hypot(*x) < 1.8 and x @ line >= 0.866 * np.hypot(*x) * np.hypot(*line) for x in steps)
+
+    return float(goes_on(b, apart)) + float(goes_on(a, -apart))
 
 
 def chord(pos, time, t, p, seconds):
@@ -76,14 +146,31 @@ def mean(rows, name, t, time, seconds):
 
 def beliefs(pos, time, seconds, belief):
     """dict from (step, a, b) to the two log-odds."""
-    found = {}
-    for (t, a, b), row in evidence(pos, time, seconds).items():
-        log_odds = belief.bias.copy()
-        for table in belief.tables:
-            x = row[table.name]
-            if not math.isnan(x):
-                log_odds += [np.interp(x, table.at, y) for y in table.log_odds]
-        found[t, a, b] = log_odds
+    found, latest, shift = {}, {}, 0.0
+    rows = evidence(pos, time, seconds)
+    usual = math.log(belief.share / (1 - belief.share))
+    for t in range(len(pos)):
+        now = [key for key in rows if key[0] == t]
+        for key in now:
+            found[key] = log_odds(belief, rows[key])
+            latest[key[1:]] = min(max(math.floor((found[key][0] + 12) / 0.25 + 0.5), 0), 80) * 0.25 - 12
+        for _ in range(2 if now else 0):
+            told = 30 * belief.share + sum(1 / (1 + math.exp(-x - shift)) for x in latest.values())
+            share = told / (30 + len(latest))
+            shift = math.log(share / (1 - share)) - usual
+        for key in now:
+            found[key] = found[key] + [shift, 0.0]
+    return found
+
+
+def log_odds(belief, row):
+    """The sums of the tables at the noise of a row, (2,)."""
+    found = np.array([np.interp(row["noise"], belief.noise, bias) for bias in belief.bias])
+    for table in belief.tables:
+        x = row[table.name]
+        if not math.isnan(x):
+            levels = [[np.interp(x, table.at, y) for y in decision] for decision in table.log_odds]
+            found += [np.interp(row["noise"], belief.noise, y) for y in levels]
     return found
 
 

@@ -8,7 +8,8 @@ import pytest
 from scenarios.errors import InputError
 from tests import reference_belief as slow
 from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs
-from tracking.grouping.pair_evidence import NAMES, StepRows, evidence
+from tracking.grouping.pair_evidence import NAMES, evidence
+from tracking.grouping.person_motion import StepRows
 
 
 def walk(seed: int, frames: int, people: int):
@@ -51,13 +52,14 @@ def test_evidence_equals_the_slow_twin(seed, seconds):
     time = times(pos, seconds)
     expected = slow.evidence(pos, time, seconds)
     rows = [
-        (key, values)
+        (key, np.append(values, noise))
         for r in evidence(step_rows(pos, time), seconds)
-        for *key, values in zip(r.step.tolist(), r.a.tolist(), r.b.tolist(), r.values, strict=True)
+        for *key, values, noise in zip(r.step.tolist(), r.a.tolist(), r.b.tolist(), r.values, r.noise, strict=True)
     ]
     assert sorted(tuple(key) for key, _ in rows) == sorted(expected)
     for key, values in rows:
-        np.testing.assert_allclose(values, [expected[tuple(key)][name] for name in NAMES], atol=1e-9, err_msg=str(key))
+        wanted = [expected[tuple(key)][name] for name in (*NAMES, "noise")]
+        np.testing.assert_allclose(values, wanted, atol=1e-7, err_msg=str(key))
 
 
 @pytest.mark.parametrize("seed", range(3))
