@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -48,7 +49,7 @@ def labels(truth: Truth, person: int) -> set[int]:
 def file_on_path(truth: Truth, frame: int) -> tuple[Ints, Array]:
     """Returns ids and x, m, of the people on the path of single-file, who walk along x, from left to right."""
     rows = truth.rows(frame)
-    x = truth.pos[rows, 0]  # type: ignore[index]
+    x = truth.pos[rows, 0]
     on = np.flatnonzero((x > 8) & (x < 18))
     on = on[np.argsort(x[on])]
     return truth.id[rows][on], x[on]
@@ -109,8 +110,8 @@ def test_who_waits_stands_as_near_as_in_a_row_of_seats() -> None:
         truth, group_of = truth_of("waiting", seed), script_groups(ENTRIES["waiting"], seed)
         for frame in range(1, truth.length + 1, 20):
             rows = truth.rows(frame)
-            still = np.hypot(*truth.vel[rows].T) < 0.2  # type: ignore[index]
-            pos = truth.pos[rows][still]  # type: ignore[index]
+            still = np.hypot(*truth.vel[rows].T) < 0.2
+            pos = truth.pos[rows][still]
             groups = np.array([group_of[person] for person in truth.id[rows][still].tolist()])
             apart = np.hypot(*(pos[:, None] - pos).transpose(2, 0, 1))
             apart[groups[:, None] == groups] = np.inf
@@ -126,7 +127,7 @@ def test_who_waits_for_the_gate_goes_through_it_together() -> None:
         truth, scenario = truth_of("waiting", seed), drawn(ENTRIES["waiting"].scenario, seed, 0)
         ((opens, _),) = scenario.world.doors[0].open or ()
         passed = [
-            truth.frame[(truth.id == person) & (truth.pos[:, 1] > 11)].min(initial=10**6)  # type: ignore[index]
+            truth.frame[(truth.id == person) & (truth.pos[:, 1] > 11)].min(initial=10**6)
             for person in np.unique(truth.id)
         ]
         after = np.array([frame / truth.fps - opens for frame in passed if frame < 10**6])
@@ -145,7 +146,7 @@ def test_people_start_at_once_when_the_light_is_green() -> None:
         assert 2 <= len(starts) <= 3
         frames = [round((starts[0] + t) * truth.fps) + 1 for t in (-1.0, GREEN)]
         speed = [
-            dict(zip(truth.id[r].tolist(), np.hypot(*truth.vel[r].T).tolist(), strict=True))  # type: ignore[index]
+            dict(zip(truth.id[r].tolist(), np.hypot(*truth.vel[r].T).tolist(), strict=True))
             for r in map(truth.rows, frames)
         ]
         stood = [person for person, v in speed[0].items() if v < 0.2]
@@ -164,11 +165,11 @@ def test_people_on_the_path_walk_in_file_and_nobody_overtakes() -> None:
             order = ids.tolist()
             assert [p for p in order if p in before] == [p for p in before if p in order], f"seed {seed}: {frame}"
             before = order
-            strangers = [group_of[a] != group_of[b] for a, b in zip(order, order[1:], strict=False)]
+            strangers = [group_of[a] != group_of[b] for a, b in pairwise(order)]
             gaps += np.diff(x)[np.array(strangers, bool)].tolist()
             rows = truth.rows(frame)
-            speeds += np.hypot(*truth.vel[rows][np.isin(truth.id[rows], ids)].T).tolist()  # type: ignore[index]
+            speeds += np.hypot(*truth.vel[rows][np.isin(truth.id[rows], ids)].T).tolist()
     low, middle = np.quantile(gaps, [0.05, 0.4])
-    assert 0.4 < low
+    assert low > 0.4
     assert 0.8 < middle < 2.0
     assert 0.6 < np.median(speeds) < 1.3
