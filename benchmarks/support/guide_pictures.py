@@ -73,9 +73,10 @@ def scenes(folder: Path, docs: Path) -> Iterator[Path]:
         command("generate", name, "--seeds", "40000", "--set", "camera.fps=5", "--streams", "none", "--out", plain)
         command("view", plain / "flockscope-demo" / f"{name}-s40000", f"{tracker}={tracks}", "--out", replay)
         yield data_of(replay, docs / "start" / f"{name}.json")
-    made = folder / "merges"
-    command("generate", "merge", "--seeds", "0", "--set", "camera.fps=5", "--out", made)
-    yield sheet(made, docs / "guides" / "sheet.jpg", 4)
+    for name, seed, out in (("single-file", "40000", "start/single-file.jpg"), ("merge", "0", "guides/sheet.jpg")):
+        made = folder / f"{name}-sheet"
+        command("generate", name, "--seeds", seed, "--set", "camera.fps=5", "--out", made)
+        yield sheet(made, docs / out, 4)
     command("track", "blob", made, "--detections", "file", "--out", folder / "boxes")
     yield sheet(made, docs / "start" / "first-ten-minutes.jpg", 3, folder / "boxes")
     crowd = folder / "labels"
