@@ -6,7 +6,7 @@ of the two recordings. Further rows change one thing of the errors 0.15/0.6: the
 which they are larger, tracks that switch ids, missed people, frames a second.
 naive: a causal rule without a fit. Two people are together if their mean offset over the last 6 s is below 1.3 m, and
 the means over the two halves of this time differ by less than 0.3 m + 0.2 m/s times it.
-SPENCER and the rule use velocities over the last 0.5 s of the positions that err, or of one frame.
+SPENCER and the rule use velocities of the positions that err, over the last 0.5 s in whole frames.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from benchmarks.belief.errors import SIZES, Errors, each_second, missed, switche
 from benchmarks.belief.pairs import f1, labelled, linked_pairs, pairs_in_frames, spencer
 from benchmarks.support.options import HOTEL, ZARA
 from benchmarks.support.tables import head, number, row
-from sim.truth.velocities import WINDOW, chords
+from sim.truth.velocities import chords
 from sim.types import Array, Bools, Ints, Truth
 from tracking.grouping.belief import Belief
 from tracking.grouping.link_rule import LinkRule
@@ -68,9 +68,8 @@ def noise(data: Path, draws: int, belief: Belief, before: Belief | None) -> None
 def scores(truth: Truth, beliefs: Mapping[str, Belief]) -> list[float]:
     """Returns the pairwise F1 of the naive rule, SPENCER, the baseline rule, and each belief."""
     i, j, same = pairs_in_frames(truth)
-    window = max(WINDOW, 1 / truth.fps)
     assert truth.pos is not None
-    moving = truth.replace(vel=chords(truth.frame, truth.id, truth.pos, truth.fps, window))
+    moving = truth.replace(vel=chords(truth.frame, truth.id, truth.pos, truth.fps))
     found = [naive_pairs(truth, i, j), spencer(moving, i, j)]
     found += [linked_pairs(truth, grouping, i, j) for grouping in (LinkRule(), *beliefs.values())]
     once, frame = np.ones((1, truth.length)), truth.frame[i] - 1

@@ -31,7 +31,7 @@ def pairs_in_frames(truth: Truth) -> tuple[Ints, Ints, Bools]:
 
 def linked_pairs(truth: Truth, rule: Grouping, i: Ints, j: Ints) -> Bools:
     """Returns which pairs of rows the rule puts into one group."""
-    derived = derive(people_as_tracks(truth), truth.fps, truth.px_per_m, rule)
+    derived = derive(people_as_tracks(truth), truth.fps, truth.px_per_m, rule, objective=True)
     group = np.concatenate([t.group for t in derived])
     return (group[i] >= 0) & (group[i] == group[j])
 
