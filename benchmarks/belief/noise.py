@@ -58,7 +58,8 @@ def noise(data: Path, draws: int, belief: Belief, before: Belief | None) -> None
         # without errors every draw is the same
         seeds = range(1 if name == f"{SIZES[0].text} m" else draws)
         found = {
-            key: np.mean([scores(case(truth, seed), beliefs) for seed in seeds], axis=0) for key, truth in truths.items()
+            key: np.mean([scores(case(truth, seed), beliefs) for seed in seeds], axis=0)
+            for key, truth in truths.items()
         }
         for key, values in {**found, "both": np.mean([*found.values()], axis=0)}.items():
             cells = [number(value) for value in values]

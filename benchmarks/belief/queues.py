@@ -1,7 +1,7 @@
 """Mode `queues` of `benchmarks.belief`: strangers who stand or walk close to each other in lines and crowds.
 
-Scenes: `queue` of the suite standard, and the suite `lines` where the catalogue has it, else those of its scenarios that
-are there. Ids are known, positions exact or with errors as in mode `noise`, m across and along the line of sight.
+Scenes: `queue` of the suite standard, and the suite `lines` where the catalogue has it, else its scenarios that are
+there. Ids are known, positions exact or with errors as in mode `noise`, m across and along the line of sight.
 false: pairs reported in one group who are in no true group together, in pair-minutes for each minute that a person is
 seen. precision, recall: of pairs of one frame. in queues: share of the true pairs found among people who both queue.
 Means over sequences with 95 % intervals; differences are paired.
@@ -27,6 +27,7 @@ from tracking.grouping.link_rule import LinkRule
 OF_STANDARD = ("queue", "queue-dense")
 LINES, SCENARIOS = "lines", ("waiting", "crossing-lights", "single-file")
 COLUMNS = ("false", "precision", "recall", "in queues")
+OF = ("", "pairwise_precision", "pairwise_recall", "pairwise_recall")  # scores at whose range intervals are cut
 
 
 def scenes() -> Iterator[Entry]:
@@ -45,9 +46,11 @@ def queues(seeds: range, belief: Belief, before: Belief | None) -> None:
         truths = [simulated(entry, seed) for seed in seeds]
         rows = {}
         for errors in SIZES[:3]:
-            erring = [with_errors(t, errors, seed) if errors.along else t for t, seed in zip(truths, seeds, strict=True)]
+            erring = [
+                with_errors(t, errors, seed) if errors.along else t for t, seed in zip(truths, seeds, strict=True)
+            ]
             found = {name: _values(truths, erring, grouping) for name, grouping in groupings.items()}
-            rows |= {f"{errors.text} m, {name}": [*map(_mean, values.T)] for name, values in found.items()}
+            rows |= {f"{errors.text} m, {name}": [*map(mean_cell, values.T, OF)] for name, values in found.items()}
             other = "before" if before else "rule"
             rows[f"{errors.text} m, belief minus {other}"] = _differences(found, other)
         table(f"{entry.name}, seeds {seeds_text(seeds)}", "errors, groups", COLUMNS, rows)
@@ -57,12 +60,8 @@ def _values(truths: list[Truth], erring: list[Truth], grouping: Grouping) -> Arr
     return np.array([pair_scores(t, e, grouping) for t, e in zip(truths, erring, strict=True)])
 
 
-def _mean(values: Array) -> str:
-    return mean_cell(values, "no score")
-
-
 def _differences(found: Mapping[str, Array], other: str) -> list[str]:
-    return [difference_cell(values, "no score") for values in (found["belief"] - found[other]).T]
+    return [*map(difference_cell, (found["belief"] - found[other]).T, OF)]
 
 
 def pair_scores(truth: Truth, erring: Truth, grouping: Grouping) -> list[float]:
