@@ -25,6 +25,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from benchmarks.support.options import add_data, add_seeds, new_parser, one_thread, seed_range
+from scenarios.errors import InputError
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouping_choice import grouping_of
 
@@ -34,18 +35,25 @@ def main() -> None:
     modes = parser.add_subparsers(dest="mode", required=True, metavar="MODE")
     for name, (options, _) in MODES.items():
         mode = modes.add_parser(name)
-        mode.add_argument("--grouping", type=belief_of, default="belief", metavar="FILE.toml", help="another belief")
+        mode.add_argument("--grouping", default="belief", metavar="FILE.toml", help="another belief")
         options(mode)
     args = parser.parse_args()
+    args.grouping = belief_of(args.grouping, "--grouping")
     MODES[args.mode][1](args)
 
 
-def belief_of(source: str) -> Belief:
-    """Returns the belief of a file, or the default one."""
+def belief_of(source: str, option: str) -> Belief:
+    """Returns the belief of a file, or the default one. Raises InputError for another grouping."""
     found = grouping_of(source)
     if not isinstance(found, Belief):
-        raise argparse.ArgumentTypeError(f"expected a belief, as `flockscope fit grouping` writes it, got {source}")
+        remedy = "name a file of `flockscope fit grouping`"
+        raise InputError(file=source, place=option, got="the baseline rule", expected="a belief", remedy=remedy)
     return found
+
+
+def second_of(args: argparse.Namespace) -> Belief | None:
+    """Returns the belief of --before, None without it."""
+    return None if args.before is None else belief_of(args.before, "--before")
 
 
 def add_scenes(parser: argparse.ArgumentParser) -> None:
@@ -54,7 +62,7 @@ def add_scenes(parser: argparse.ArgumentParser) -> None:
 
 
 def add_before(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--before", type=belief_of, metavar="FILE.toml", help="a second belief")
+    parser.add_argument("--before", metavar="FILE.toml", help="a second belief")
 
 
 def recordings(args: argparse.Namespace) -> None:
@@ -120,7 +128,7 @@ def noise_options(parser: argparse.ArgumentParser) -> None:
 def noise(args: argparse.Namespace) -> None:
     from benchmarks.belief.noise import noise
 
-    noise(args.data, args.seeds, args.grouping, args.before)
+    noise(args.data, args.seeds, args.grouping, second_of(args))
 
 
 def queue_options(parser: argparse.ArgumentParser) -> None:
@@ -131,7 +139,7 @@ def queue_options(parser: argparse.ArgumentParser) -> None:
 def queues(args: argparse.Namespace) -> None:
     from benchmarks.belief.queues import queues
 
-    queues(args.seeds, args.grouping, args.before)
+    queues(args.seeds, args.grouping, second_of(args))
 
 
 def input_options(parser: argparse.ArgumentParser) -> None:
@@ -147,10 +155,16 @@ def input_options(parser: argparse.ArgumentParser) -> None:
 
 
 def inputs(args: argparse.Namespace) -> None:
-    from benchmarks.belief.inputs import PARTS, inputs
+    from benchmarks.belief.inputs import PARTS, inputs, stored_scores
 
+    unknown = set(args.part) - PARTS.keys()
+    if unknown:
+        remedy = "name some of them, or none for all"
+        raise InputError(place="PART", got=min(unknown), expected=", ".join(PARTS), remedy=remedy)
     seeds = {name: getattr(args, f"{name}_seeds") for name in args.part or PARTS}
-    inputs(seeds, args.suites, args.data, args.grouping, args.before, args.json)
+    stored = args.before is not None and args.before.endswith(".json")
+    before = stored_scores(args.before) if stored else second_of(args)
+    inputs(seeds, args.suites, args.data, args.grouping, before, args.json)
 
 
 def cost_options(parser: argparse.ArgumentParser) -> None:
@@ -172,7 +186,7 @@ def pets_options(parser: argparse.ArgumentParser) -> None:
 def pets(args: argparse.Namespace) -> None:
     from benchmarks.belief.pets import pets
 
-    pets(args.data, args.grouping, args.before)
+    pets(args.data, args.grouping, second_of(args))
 
 
 Mode = tuple[Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], None]]

@@ -15,7 +15,7 @@ from scenarios.loading.resolve import Entry
 from scenarios.schema.sensor import Sensor
 from sim.crowd.world import run
 from sim.sequence import LabelledSequence, observe
-from sim.types import Tracks, Truth
+from sim.types import Ints, Tracks, Truth
 from tracking.fitting.sensor import fit_sensor
 from tracking.grouping.grouped_tracks import groups_in_frames
 from tracking.grouping.known_people import people_as_tracks
@@ -83,3 +83,21 @@ def at_true_places(truth: Truth, tracks: Sequence[Tracks]) -> list[Tracks]:
         group, events = own.group[order][np.isin(own.id[order], true.id)], own.events
         moved.append(true.keep(row).replace(group=group, events=events, derived=True))
     return [t.replace(groups=groups) for t, groups in zip(moved, groups_in_frames(moved), strict=True)]
+
+
+def at_most(truth: Truth, tracks: Sequence[Tracks]) -> float:
+    """Returns the pairwise F1 of the true groups if only the people of `tracks`, with known ids, are reported; nan
+    without true pairs."""
+    size = int(truth.id.max(initial=0)) + 1
+    reported = np.concatenate([t.index * size + t.id for t in tracks])
+    there = np.isin(truth.frame * size + truth.id, reported)
+    grouped = truth.group >= 0
+    key = truth.frame * (int(truth.group.max(initial=0)) + 1) + truth.group
+    true, seen = (_pairs(key[rows]) for rows in (grouped, grouped & there))
+    return 2 * seen / (true + seen) if true else float("nan")
+
+
+def _pairs(key: Ints) -> int:
+    """Returns the number of pairs of rows with the same key."""
+    count = np.unique(key, return_counts=True)[1]
+    return int((count * (count - 1) // 2).sum())

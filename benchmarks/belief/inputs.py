@@ -9,7 +9,8 @@ blob      the same boxes, tracked by `blob`
 pixels    pictures, tracked by `blob`
 trackers  what the scenario's own sensor reports, by tracker; groups are the tracker's own where it names them
 
-Columns: pairwise F1, group F1 and event F1, means over sequences with 95 % intervals; merges that are right, wrong and
+Columns: pairwise F1, group F1 and event F1, means over sequences with 95 % intervals; at most: pairwise F1 of the true
+groups of the people who are detected, where that is known; merges that are right, wrong and
 missed in all; median life of groups, s: a stretch is a time in which exactly the same two or more people are one group
 (who is missed for 1 s or less counts as before), then the share of stretches below 1 s, each with the truth's.
 --before: the same of another belief, and the paired difference; or the paired difference from the scores that --json
@@ -24,11 +25,10 @@ from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from benchmarks.belief.cameras import VIEWS, at_true_places, known_boxes, seen_by
+from benchmarks.belief.cameras import VIEWS, at_most, at_true_places, known_boxes, seen_by
 from benchmarks.belief.lives import lives_of_tracks, lives_of_truth
 from benchmarks.support.options import seeds_text
 from benchmarks.support.tables import difference_cell, mean_cell, number, table
@@ -39,7 +39,6 @@ from sim.types import Array, DetectionMode, Tracks, Truth
 from tracking.grouping.belief import Belief
 from tracking.grouping.foot_points import completed
 from tracking.grouping.grouped_tracks import derive
-from tracking.grouping.grouping_choice import grouping_of
 from tracking.grouping.known_people import people_as_tracks
 from tracking.running.prepare import prepare
 from tracking.scoring.evaluation import evaluate
@@ -47,12 +46,13 @@ from tracking.scoring.evaluation import evaluate
 KEYS = ("pairwise_F1", "group_F1_hull", "event_F1", "merge_TP", "merge_FP", "merge_FN")
 SCORES = KEYS[:3]
 COLUMNS = (
-    "pairwise F1", "group F1", "event F1", "merges right, wrong, missed", "life, s", "of the truth", "below 1 s",
-    "of the truth",
+    "pairwise F1", "at most", "group F1", "event F1", "merges right, wrong, missed", "life, s", "of the truth",
+    "below 1 s", "of the truth",
 )  # fmt: skip
 NAMING = ("group-pda", "relational", "particle", "joint")
 BRIEF = 1.0  # s
 Grouped = Callable[[Belief], Sequence[Tracks]]
+Stored = dict[str, dict[str, dict[str, list[float]]]]  # `KEYS` by part, row and sequence
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,7 @@ class Input:
     truth: Truth
     grouped: Grouped  # returns its tracks with the groups of a belief
     apart: bool = True  # another belief may find other groups
+    most: float = float("nan")  # pairwise F1 of the true groups of the people who are detected, if that is known
 
 
 def _tracked(tracker: str, sequence: LabelledSequence, mode: DetectionMode, seed: int) -> Grouped:
@@ -99,7 +100,7 @@ def of_boxes(entry: Entry, seed: int, suite: str, number: int, data: Path) -> It
         )  # fmt: skip
         return at_true_places(truth, found)
 
-    yield Input((suite, view.name), truth, grouped)
+    yield Input((suite, view.name), truth, grouped, most=at_most(truth, boxes))
 
 
 def of_blob(entry: Entry, seed: int, suite: str, number: int, data: Path) -> Iterator[Input]:
@@ -142,10 +143,13 @@ class Found:
     scores: dict[str, list[float]] = field(default_factory=dict)  # by sequence: `KEYS`
     lives: list[Array] = field(default_factory=list)  # of the reported groups of each sequence, s
     true: list[Array] = field(default_factory=list)  # of the true groups, s
+    most: list[float] = field(default_factory=list)
 
-    def add(self, sequence: str, truth: Truth, tracks: Sequence[Tracks]) -> None:
+    def add(self, sequence: str, given: Input, tracks: Sequence[Tracks]) -> None:
         """Adds a sequence."""
+        truth = given.truth
         found = evaluate(truth, tracks)
+        self.most.append(given.most)
         self.scores[sequence] = [float(found[key]) for key in KEYS]
         of_people = all(t.unit == "person" for t in tracks)
         self.lives.append(lives_of_tracks(tracks, truth.fps) if of_people else np.zeros(0))
@@ -159,7 +163,9 @@ class Found:
         spans = [number(float(np.median(x)), 1) if len(x) else "–" for x in lives]
         brief = [f"{(x < BRIEF).mean():.1%}" if len(x) else "–" for x in lives]
         means = [mean_cell(column) for column in values[:, : len(SCORES)].T]
-        return [*means, merges, *spans, *brief]
+        known = [x for x in self.most if np.isfinite(x)]
+        most = number(float(np.mean(known))) if known else "–"
+        return [means[0], most, *means[1:], merges, *spans, *brief]
 
 
 def differences(own: Mapping[str, Sequence[float]], other: Mapping[str, Sequence[float]]) -> list[str]:
@@ -169,22 +175,16 @@ def differences(own: Mapping[str, Sequence[float]], other: Mapping[str, Sequence
     change = np.array([np.subtract(own[name], other[name]) for name in shared]).reshape(-1, len(KEYS))
     scores = [difference_cell(column) for column in change[:, : len(SCORES)].T]
     merges = [f"{np.nanmean(x):+.2f}" if np.isfinite(x).any() else "–" for x in change[:, len(SCORES) :].T]
-    return [*scores, ", ".join(merges), *[""] * (len(COLUMNS) - len(SCORES) - 1)]
+    return [scores[0], "", *scores[1:], ", ".join(merges), "", "", "", ""]
 
 
 def inputs(
-    seeds: Mapping[str, range], suites: Sequence[str] | None, data: Path, belief: Belief, before: str | None,
-    store: Path | None,
+    seeds: Mapping[str, range], suites: Sequence[str] | None, data: Path, belief: Belief,
+    before: Belief | Stored | None = None, store: Path | None = None,
 ) -> None:  # fmt: skip
-    """Prints a table for each part of `seeds`."""
-    unknown = seeds.keys() - PARTS.keys()
-    if unknown:
-        expected = ", ".join(PARTS)
-        raise InputError(place="PART", got=min(unknown), expected=expected, remedy="name some of them, or none for all")
-    stored = stored_scores(before) if before and before.endswith(".json") else {}
-    second = grouping_of(before) if before and not stored else None
-    assert second is None or isinstance(second, Belief)
-    kept: dict[str, Any] = {}
+    """Prints a table for each part of `seeds`. store: file that the scores of each sequence are written to."""
+    second, stored = (before, {}) if isinstance(before, Belief) else (None, before or {})
+    kept: Stored = {}
     for name in seeds:
         rows = _measured(PARTS[name], seeds[name], suites, data, {"belief": belief, "before": second})
         cells = {}
@@ -216,16 +216,16 @@ def _measured(
                             if belief is not None and (name == "belief" or given.apart):
                                 tracks = given.grouped(belief)
                                 for row in given.rows:
-                                    rows[name][row].add(f"{entry.name}, seed {seed}", given.truth, tracks)
+                                    rows[name][row].add(f"{entry.name}, seed {seed}", given, tracks)
                     number += 1
     return rows
 
 
-def stored_scores(path: str) -> dict[str, dict[str, dict[str, list[float]]]]:
+def stored_scores(path: str) -> Stored:
     """Returns the scores by part, row and sequence that --json stored. Raises InputError for another file."""
     expected, remedy = "scores by part, row and sequence", "write the file with --json"
     try:
-        found = json.loads(Path(path).read_text(encoding="utf-8"))
+        found: Stored = json.loads(Path(path).read_text(encoding="utf-8"))
         lengths = {len(scores) for part in found.values() for row in part.values() for scores in row.values()}
     except (OSError, ValueError, AttributeError, TypeError) as error:
         raise InputError(file=path, got=str(error), expected=expected, remedy=remedy) from error
