@@ -19,20 +19,19 @@ from benchmarks.support.options import seeds_text
 from benchmarks.support.tables import head, number, row
 from scenarios.errors import InputError
 from scenarios.loading.resolve import Entry, resolve
+from sim.sequence import simulate
 from sim.types import Array, Bools, Tracks, Truth
-from tracking.fitting.belief_scores import reliability
-from tracking.fitting.grouping_scenes import simulated
 from tracking.grouping.belief import Belief, pair_probabilities
 from tracking.grouping.foot_points import standing
 from tracking.grouping.known_people import people_as_tracks
 
-LEAST = 1e-12  # probabilities nearer to 0 or 1 count as this near
+BINS = 15  # of equal width, between the probabilities 0 and 1
 Made = Callable[[Entry, int, int, Path], tuple[Truth, Sequence[Tracks]]]
 
 
 def _with_errors(index: int) -> Made:
     def made(entry: Entry, seed: int, number: int, data: Path) -> tuple[Truth, Sequence[Tracks]]:
-        truth = simulated(entry, seed)
+        truth = simulate(entry.scenario, seed, entry.repeat, streams=()).truth
         return truth, people_as_tracks(with_errors(truth, SIZES[index], seed) if index else truth)
 
     return made
@@ -77,12 +76,10 @@ def told(truth: Truth, tracks: Sequence[Tracks], belief: Belief) -> tuple[Array,
 
 def cells(probability: Array, true: Bools, weight: Array) -> list[str]:
     """Returns the cells of an input: calibration error, means of all rows, and of those above 0.9."""
-    inside = np.clip(probability, LEAST, 1 - LEAST)
-    bins = reliability(np.log(inside / (1 - inside)), true, weight)
-    bins = bins[bins[:, 0] > 0]
-    error = float(np.abs(bins[:, 0] * (bins[:, 1] - bins[:, 2])).sum())
+    place = np.minimum((probability * BINS).astype(np.int64), BINS - 1)
+    total = weight.sum()
+    error = float(np.abs(np.bincount(place, weight * (probability - true), BINS)).sum() / total)
     sure = probability > 0.9
     mates = float(np.average(true[sure], weights=weight[sure])) if sure.any() else float("nan")
-    total = weight.sum()
     means = (float(x @ weight / total) for x in (probability, true))
     return [number(error), *(number(x) for x in means), f"{float(weight[sure].sum() / total):.1%}", number(mates)]

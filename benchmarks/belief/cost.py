@@ -10,7 +10,8 @@ share of real time.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def crowd(people: int) -> Truth:
     size = int(one.id.max()) + 1
     apart = float(np.ptp(one.pos, axis=0).max()) + BESIDE
     side = int(np.ceil(np.sqrt(people / mean)))
-    copies = [of_rows(_first(one, people), slice(None))] if people < mean else []
+    copies = [_first(one, people)] if people < mean else []
     for k in range(0 if copies else round(people / mean)):
         place = apart * np.array(divmod(k, side))
         frame = (one.frame - 1 + LATER * k) % one.length + 1
@@ -75,9 +76,9 @@ def cost(people: Sequence[int], rounds: int, belief: Belief) -> None:
         slow = each_step(truth)
         tracks = people_as_tracks(slow)
         pairs = len(pair_probabilities(tracks, slow.fps, 1.0, belief).frame)
-        works: tuple[Callable[[], object], ...] = (
-            lambda tracks=tracks, slow=slow: pair_probabilities(tracks, slow.fps, 1.0, belief),
-            lambda tracks=tracks, slow=slow: derive(tracks, slow.fps, 1.0, belief, objective=True),
+        works = (
+            partial(pair_probabilities, tracks, slow.fps, 1.0, belief),
+            partial(derive, tracks, slow.fps, 1.0, belief, objective=True),
         )
         spent = [best_times(work, rounds)[0] for work in works]
         row([_in_view(truth), str(pairs), *(f"{1e6 * seconds / pairs:.2f}" for seconds in spent)])

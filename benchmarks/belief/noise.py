@@ -24,6 +24,7 @@ from benchmarks.support.tables import head, number, row
 from sim.truth.velocities import chords
 from sim.types import Array, Bools, Ints, Truth
 from tracking.grouping.belief import Belief
+from tracking.grouping.grouping_choice import Grouping
 from tracking.grouping.link_rule import LinkRule
 
 SPAN, REACH, DRIFT, STRAY, APART = 6.0, 1.3, 0.2, 0.3, 6.0  # s, m, m/s, m, m: of the naive rule
@@ -72,7 +73,8 @@ def scores(truth: Truth, beliefs: Mapping[str, Belief]) -> list[float]:
     assert truth.pos is not None
     moving = truth.replace(vel=chords(truth.frame, truth.id, truth.pos, truth.fps))
     found = [naive_pairs(truth, i, j), spencer(moving, i, j)]
-    found += [linked_pairs(truth, grouping, i, j) for grouping in (LinkRule(), *beliefs.values())]
+    groupings: list[Grouping] = [LinkRule(), *beliefs.values()]
+    found += [linked_pairs(truth, grouping, i, j) for grouping in groupings]
     once, frame = np.ones((1, truth.length)), truth.frame[i] - 1
     return [float(f1(once, frame, same, pairs)[0]) for pairs in found]
 

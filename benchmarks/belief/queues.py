@@ -18,8 +18,8 @@ from benchmarks.belief.pairs import linked_pairs, pairs_in_frames
 from benchmarks.support.options import seeds_text
 from benchmarks.support.tables import difference_cell, mean_cell, table
 from scenarios.loading.resolve import Entry, names, resolve, suite_names
+from sim.sequence import simulate
 from sim.types import Array, Bools, Ints, Truth
-from tracking.fitting.grouping_scenes import simulated
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouping_choice import Grouping
 from tracking.grouping.link_rule import LinkRule
@@ -43,8 +43,8 @@ def queues(seeds: range, belief: Belief, before: Belief | None) -> None:
     groupings: dict[str, Grouping] = {"rule": LinkRule(), "belief": belief, **({"before": before} if before else {})}
     print("false: pair-minutes for each person-minute")
     for entry in scenes():
-        truths = [simulated(entry, seed) for seed in seeds]
-        rows = {}
+        truths: list[Truth] = [simulate(entry.scenario, seed, entry.repeat, streams=()).truth for seed in seeds]
+        rows: dict[str, list[str]] = {}
         for errors in SIZES[:3]:
             erring = [
                 with_errors(t, errors, seed) if errors.along else t for t, seed in zip(truths, seeds, strict=True)

@@ -60,6 +60,7 @@ def test_ids_switch_and_labels_stay():
     true = true.replace(group=np.where(true.id == 1, 5, -1))
     other = switched(true, 2.0, 0)
     assert np.array_equal(np.lexsort((other.id, other.frame)), np.arange(len(true.id)))
+    assert (np.bincount(other.frame * 3 + other.id) <= 1).all()  # nobody is twice in a frame
     assert 0 < (other.id[other.pos[:, 1] == 0] == 2).mean() < 1  # who walks at y = 0 has the other's id for a while
     assert np.array_equal(other.group >= 0, other.pos[:, 1] == 0)
 

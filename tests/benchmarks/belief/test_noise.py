@@ -56,3 +56,10 @@ def test_scores_of_a_couple_are_perfect():
     assert naive == 1.0
     assert spencer == pytest.approx(1.0, abs=0.02)  # without velocities in the first frame
     assert rule > 0.9
+
+
+def test_who_is_far_away_now_is_not_together():
+    scenes = [hand_made.Scene({1: (0.0, 0.0), 2: (0.7, 0.0)})] * 14 + [hand_made.Scene({1: (0.0, 0.0), 2: (7.0, 0.0)})]
+    truth = hand_made.truth(scenes).replace(fps=2.5)
+    i, j, _ = pairs_in_frames(truth)
+    assert naive_pairs(truth, i, j).tolist() == [True] * 14 + [False]
