@@ -56,6 +56,13 @@ def second_of(args: argparse.Namespace) -> Belief | None:
     return None if args.before is None else belief_of(args.before, "--before")
 
 
+def count(text: str) -> int:
+    """Returns a number of at least 1. Raises ArgumentTypeError, which argparse reports, otherwise."""
+    if not text.isdecimal() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"expected a number of at least 1, got {text!r}")
+    return int(text)
+
+
 def add_scenes(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--scenes", nargs="+", metavar="NAME", help="scenarios, suites or *.toml files")
     add_seeds(parser, "20000:20001")
@@ -120,7 +127,7 @@ def calibration(args: argparse.Namespace) -> None:
 
 
 def noise_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--seeds", type=int, default=3, metavar="N", help="draws of the errors, seeds 0 to N - 1")
+    parser.add_argument("--seeds", type=count, default=3, metavar="N", help="draws of the errors, seeds 0 to N - 1")
     add_before(parser)
     add_data(parser)
 
@@ -168,8 +175,8 @@ def inputs(args: argparse.Namespace) -> None:
 
 
 def cost_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--people", nargs="+", type=int, default=[30, 300], help="numbers of people in view")
-    parser.add_argument("--rounds", type=int, default=3, help="runs of which the best counts")
+    parser.add_argument("--people", nargs="+", type=count, default=[30, 300], help="numbers of people in view")
+    parser.add_argument("--rounds", type=count, default=3, help="runs of which the best counts")
 
 
 def cost(args: argparse.Namespace) -> None:

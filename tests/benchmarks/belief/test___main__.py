@@ -32,3 +32,14 @@ def test_each_part_has_its_seeds(monkeypatch):
     monkeypatch.setattr(sys, "argv", ["belief", "inputs", "truth", "pixels", "--pixels-seeds", "3:5"])
     main()
     assert given == {"truth": range(20_000, 20_002), "pixels": range(3, 5)}
+
+
+@pytest.mark.parametrize(
+    "words", [("noise", "--seeds", "0"), ("cost", "--people", "30", "x"), ("cost", "--rounds", "0")]
+)
+def test_numbers_are_at_least_one(words, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", ["belief", *words])
+    with pytest.raises(SystemExit) as end:
+        main()
+    assert end.value.code == 2
+    assert "expected a number of at least 1, got" in capsys.readouterr().err
