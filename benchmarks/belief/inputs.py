@@ -151,8 +151,7 @@ class Found:
         found = evaluate(truth, tracks)
         self.most.append(given.most)
         self.scores[sequence] = [float(found[key]) for key in KEYS]
-        of_people = all(t.unit == "person" for t in tracks)
-        self.lives.append(lives_of_tracks(tracks, truth.fps) if of_people else np.zeros(0))
+        self.lives.append(lives_of_tracks(tracks, truth.fps))
         self.true.append(lives_of_truth(truth))
 
     def cells(self) -> list[str]:

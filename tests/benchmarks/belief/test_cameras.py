@@ -45,9 +45,10 @@ def test_groups_are_scored_at_the_true_places():
               for k in range(30)]  # fmt: skip
     shapes = tuple(groups_in_frames(hand_made.tracks(scenes)))
     truth = hand_made.truth(scenes, groups=shapes)
-    away = [t.replace(pos=t.pos + 9.0).keep(np.array([1, 0])) for t in hand_made.tracks(scenes)]
+    away = [t.replace(pos=t.pos + 9.0).keep(np.array([2, 1, 0])) for t in hand_made.tracks(scenes)]
     placed = cameras.at_true_places(truth, away)
-    assert [t.id.tolist() for t in placed] == [[1, 2]] * 30
+    assert [t.id.tolist() for t in placed] == [[1, 2, 3]] * 30
+    assert [t.group.tolist() for t in placed] == [[7, 7, -1]] * 30
     assert evaluate(truth, placed)["pairwise_F1"] == 1.0
     assert evaluate(truth, placed)["group_F1_hull"] == 1.0
 
