@@ -23,6 +23,8 @@ def test_the_couples_are_the_groups():
     truth = pets.with_couples(people([9, 11, 12, 13, 15]))
     grouped = {k: truth.id[truth.rows(k)][truth.group[truth.rows(k)] >= 0].tolist() for k in (1, 22, 24)}
     assert grouped == {1: [], 22: [11, 12], 24: [9, 11, 12, 15]}
+    members = {k: sorted(m.tolist() for m in truth.groups_px[k - 1].members) for k in (1, 22, 24)}
+    assert members == {1: [], 22: [[11, 12]], 24: [[9, 15], [11, 12]]}
     tracks = [
         t.replace(group=truth.group[truth.rows(t.index)], groups=truth.groups_px[t.index - 1], derived=True)
         for t in people_as_tracks(truth)
