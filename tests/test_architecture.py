@@ -122,6 +122,7 @@ def test_tests_mirror_the_sources() -> None:
     files = [path.relative_to(ROOT / "tests") for path in (ROOT / "tests").rglob("test_*.py")]
     assert {path.parent for path in files if not (ROOT / path.parent).is_dir()} == set()
     sources = tuple(f"{name.replace('.', '/').removesuffix('_kernels')}_" for name in modules())
+    sources += tuple(f"{path.relative_to(ROOT).with_suffix('')}_" for path in (ROOT / "benchmarks").rglob("*.py"))
     assert sum(not f"{path.parent / path.stem[5:]}_".startswith(sources) for path in files) <= SPANNING
 
 
