@@ -2,7 +2,8 @@
 
 The weight of a scene is the number of times that it is named; all pairs of a scene have equal weight. The penalty is on
 the squared log-odds, on the curvature of the tables and on their differences from one level of noise to the next. The
-share of mates where none is known is that of the least log loss, the threshold that of the greatest F1.
+share of mates where none is known is that by which as many pairs are told to be mates as are, the thresholds are those
+of the greatest F1.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 1.5)  # m: levels of noise.
 CURVED, LARGE, UNLIKE = 5e-5, 1.7e-5, 1e-4
 STEPS = 200  # Most iterations.
 SHARES = tuple(0.02 * k for k in range(1, 13))  # Of mates, of which one is chosen.
+NEARLY = 1e-3  # F1
 THRESHOLDS = 100  # Evenly spaced probabilities, of which the threshold is one.
 
 
@@ -77,11 +79,12 @@ def fit_belief(now: PairSample, events: PairSample | None = None, used: Sequence
     cuts = np.cumsum([len(knots) for knots in knots_of.values()])
     *heights, bias = np.split(columns, cuts, axis=2)
     tables = tuple(Table(*row) for row in zip(knots_of, knots_of.values(), heights, strict=True))
-    belief = Belief(tables, np.array(LEVELS), bias[..., 0])
+    belief = Belief(tables, np.array(LEVELS), bias[..., 0], np.full(len(LEVELS), 0.5))
     log_odds = belief.log_odds(now.values, now.noise)[:, 0]
     shifted = {share: log_odds + shifts_of_sample(now, log_odds, share) for share in SHARES}
-    share = min(SHARES, key=lambda share: log_loss(now, shifted[share]))
-    return replace(belief, share=share, threshold=best_threshold(now, shifted[share]))
+    mates = now.weight @ now.together
+    share = min(SHARES, key=lambda share: abs(now.weight @ (1 / (1 + np.exp(-shifted[share]))) - mates))
+    return replace(belief, share=share, threshold=best_thresholds(now, shifted[share]))
 
 
 def log_loss(sample: PairSample, log_odds: Array) -> float:
@@ -127,19 +130,24 @@ def _fit_column(sample: PairSample, knots_of: Mapping[str, Array], left_out: tup
     return column
 
 
-def best_threshold(sample: PairSample, log_odds: Array) -> float:
-    """Returns the threshold with the greatest mean F1 over scenes with pairs in one true group; of several the middle.
-    A pair counts as together if its probability is above the threshold. log_odds (R,): beliefs of the sample's rows."""
+def best_thresholds(sample: PairSample, log_odds: Array) -> Array:
+    """Returns for each level of noise the threshold (L,) with the greatest mean F1 over scenes with pairs in one true
+    group; the middle of all that are nearly as good. A pair counts as together if its probability is above the
+    threshold. log_odds (R,): beliefs of the sample's rows, which count for the levels of noise beside them."""
     place = (THRESHOLDS / (1 + np.exp(-log_odds))).astype(np.int64).clip(0, THRESHOLDS - 1)
     shape = (sample.scene[-1] + 1, THRESHOLDS)
     place += sample.scene * THRESHOLDS
-    count = [np.bincount(place, x, math.prod(shape)).reshape(shape) for x in (sample.together, None)]
-    hits, told = (c[:, ::-1].cumsum(axis=1)[:, ::-1] for c in count)  # by scene: rows above k / THRESHOLDS
-    mates = hits[:, :1]
-    weight = np.bincount(sample.scene, sample.weight) * (mates[:, 0] > 0)
-    f1 = weight @ (2 * hits / np.maximum(told + mates, 1))
-    best = np.flatnonzero(f1 == f1.max())
-    return float(best[len(best) // 2]) / THRESHOLDS
+    (level,), (more,) = (x.T for x in _places(sample.noise[:, None], [np.array(LEVELS)]))
+    best = np.empty(len(LEVELS))
+    for k in range(len(LEVELS)):
+        part = np.where(level == k, 1 - more, np.where(level == k - 1, more, 0.0))
+        count = [np.bincount(place, x * part, math.prod(shape)).reshape(shape) for x in (sample.together, 1)]
+        hits, told = (c[:, ::-1].cumsum(axis=1)[:, ::-1] for c in count)  # by scene: rows above k / THRESHOLDS
+        mates = hits[:, :1]
+        weight = np.bincount(sample.scene, sample.weight * part) * (mates[:, 0] > 0)
+        f1 = weight @ (2 * hits / np.maximum(told + mates, 1e-9)) / max(weight.sum(), 1e-9)
+        best[k] = np.flatnonzero(f1 >= f1.max() - NEARLY).mean() / THRESHOLDS
+    return best
 
 
 def _knots(values: Array) -> Array:

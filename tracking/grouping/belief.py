@@ -37,7 +37,7 @@ FROZEN = Path(__file__).with_name("belief.toml")  # The default belief.
 KIND = "belief"
 UNSEEN = -4.0  # Belief about two people who are too far apart for a row: log-odds.
 DECISIONS = NOW, EVENTS = ("now", "events")  # Columns of a table.
-NUMBERS = ("threshold", "share", "stay", "come", "memory")  # Numbers of `Belief` in its file.
+NUMBERS = ("share", "stay", "come", "memory")  # Numbers of `Belief` in its file.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -56,7 +56,7 @@ class Belief:
     tables: tuple[Table, ...]
     noise: Array  # (L,): ascending levels of noise, m, the standard deviation of a person's position
     bias: Array  # (2, L): log-odds added to the tables, for `DECISIONS`, by levels of noise
-    threshold: float = 0.5  # probability above which two people are together now
+    threshold: Array  # (L,): probability above which two people are together now, by levels of noise
     share: float = 0.1  # of mates among the pairs of the fit, where none is known (`mate_share`)
     # stay, come: log-odds added for pairs that were in one group a step before, and taken from all others: groups
     # of events change the later the greater they are
@@ -70,29 +70,31 @@ class Belief:
         return (self.come - self.stay) / 2
 
     def as_dict(self) -> dict[str, object]:
-        """Returns the entries of run.json about the belief: kind, bias, its numbers, and a hash of `toml_text`."""
+        """Returns the entries of run.json about the belief: kind, its numbers, and a hash of `toml_text`."""
         text, numbers = self.toml_text().encode(), {name: getattr(self, name) for name in NUMBERS}
-        return {"grouping": KIND, "bias": self.bias.tolist(), **numbers, "hash": sha256(text).hexdigest()}
+        return {"grouping": KIND, "threshold": self.threshold.tolist(), **numbers, "hash": sha256(text).hexdigest()}
 
     @classmethod
     def from_toml(cls, path: str | Path) -> Belief:
         """Returns the belief in a file that `toml_text` wrote. Raises InputError for another file or wrong values."""
         content = parse(Path(path))
-        rows, keys = content.pop("table", None), {"noise", "bias", *NUMBERS}
+        rows, keys = content.pop("table", None), {"noise", "bias", "threshold", *NUMBERS}
         if content.pop("grouping", None) != KIND or not isinstance(rows, list) or not rows:
             _refuse(path, "grouping", "another file", f'grouping = "{KIND}" and at least one [[table]]')
         if content.keys() != keys:
             _refuse(path, min(content.keys() - keys, default="its keys"), sorted(content), ", ".join(sorted(keys)))
         noise = _ascending(path, "noise", content.pop("noise"))
         bias = _matrix(path, "bias", content.pop("bias"), (len(DECISIONS), len(noise)))
+        threshold = _numbers(path, "threshold", content.pop("threshold"), len(noise), low=0.0)
         numbers = {name: float(_numbers(path, name, [value], 1, low=0.0)[0]) for name, value in content.items()}
         tables = tuple(_table(path, f"table {k}", row, len(noise)) for k, row in enumerate(rows, 1))
-        return cls(tables, noise, bias, **numbers)
+        return cls(tables, noise, bias, threshold, **numbers)
 
     def toml_text(self, comment: str = "") -> str:
         """Returns the belief as the text of a TOML file. comment: lines of text to begin it with, without "#"."""
         lines = [*(f"# {line}" for line in comment.splitlines()), f'grouping = "{KIND}"']
-        lines += [f"{name} = {toml_value(np.round(getattr(self, name), 3).tolist())}" for name in ("noise", "bias")]
+        arrays = ("noise", "bias", "threshold")
+        lines += [f"{name} = {toml_value(np.round(getattr(self, name), 3).tolist())}" for name in arrays]
         lines += [f"{name} = {toml_value(round(float(getattr(self, name)), 4))}" for name in NUMBERS]
         for table in self.tables:
             lines += ["", "[[table]]", f"name = {toml_value(table.name)}"]
@@ -106,6 +108,11 @@ class Belief:
         from tracking.grouping.belief_kernels import table_sums
 
         return table_sums(values, noise, self.noise, self.bias, *_joined(self))
+
+
+    def together(self, log_odds: Array, noise: Array) -> Array:
+        """Returns by how much the probability of log-odds (R,) of now exceeds the threshold at noise (R,), m."""
+        return np.asarray(1 / (1 + np.exp(-log_odds)) - np.interp(noise, self.noise, self.threshold))
 
 
 @lru_cache(maxsize=8)
@@ -126,6 +133,7 @@ class PairBeliefs:
     a: Ints
     b: Ints
     log_odds: Array
+    noise: Array  # (R,): of positions, m
 
 
 def pair_beliefs(seen: StepRows, seconds: float, belief: Belief) -> PairBeliefs:
@@ -135,10 +143,10 @@ def pair_beliefs(seen: StepRows, seconds: float, belief: Belief) -> PairBeliefs:
     for rows in evidence(seen, seconds):
         log_odds = belief.log_odds(rows.values, rows.noise)
         log_odds[:, 0] += share.add(rows.step, rows.pair, log_odds[:, 0])
-        parts.append((rows.step, rows.a, rows.b, log_odds))
+        parts.append((rows.step, rows.a, rows.b, log_odds, rows.noise))
     if not parts:
         nobody = np.zeros(0, np.int64)
-        return PairBeliefs(nobody, nobody, nobody, np.zeros((0, 2)))
+        return PairBeliefs(nobody, nobody, nobody, np.zeros((0, 2)), np.zeros(0))
     return PairBeliefs(*(np.concatenate(column) for column in zip(*parts, strict=True)))
 
 

@@ -99,15 +99,10 @@ def belief_groups(
     order = np.argsort(step, kind="stable")
     row, step, log_odds = row[order], step[order], log_odds[order]
     pairs = (step, found.a[row], found.b[row])
-    gain = _gain(found.log_odds[row, 0], belief)
-    now = groups_of_steps(shape, *pairs, gain, float(_gain(UNSEEN, belief)))
+    gain = belief.together(found.log_odds[row, 0], found.noise[row])
+    now = groups_of_steps(shape, *pairs, gain, float(belief.together(np.array(UNSEEN), np.array(0.0))))
     lasting = groups_of_steps(shape, *pairs, log_odds, UNSEEN, belief.stay, belief.come)
     return FoundGroups(_links(lasting, size, found), now, size)
-
-
-def _gain(log_odds: Array | float, belief: Belief) -> Array:
-    """Returns what it is worth to put pairs into one group now: their probability above the threshold."""
-    return np.asarray(1 / (1 + np.exp(-np.asarray(log_odds))) - belief.threshold)
 
 
 def _links(label: StepGroups, size: int, found: PairBeliefs) -> Links:
