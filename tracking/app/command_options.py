@@ -316,6 +316,9 @@ class ViewOptions(BoxOptions, words="view"):
         "Pictures inside the page, beside it as FILE.view.mp4, or none. auto: beside from 12 MB on.", "auto")
     by: str | None = option(
         "The score that ranks in a report. Default: objective, or what all runs have of it.", None, metavar="SCORE")
+    belief: Path | None = option(
+        "Belief whose evidence about two people is shown: file of `fit grouping`. Default: the default belief.", None,
+        metavar="FILE.toml", flag="--grouping")
     camera: Path | None = CAMERA()
     workers: int = PROCESSES()
 

@@ -26,6 +26,7 @@ from tracking.grouping.grouped_tracks import (
     with_velocities,
 )
 from tracking.grouping.grouping_choice import Grouping
+from tracking.grouping.tracks_table import TracksTable, tabulate
 
 FLATTENED = 0.4  # k of `as_measured`: of 0 to 1, about the greatest F1 of groups and pairs from 5 to 60 degrees above.
 OVERHEAD = 1e-6  # Level part of the axis of a camera that looks straight down.
@@ -107,15 +108,29 @@ def completed(
     ground = ground_below(tracks, camera, px_per_m, source, image_size)
     if ground.camera is None:
         return with_groups(tracks, fps, px_per_m, rule, objective=objective), ground
-    stairs = None if camera is None else scene  # the boxes tell no place in the scene
-    in_image = plane_of_run(tracks) == "image"
-    feet = (
-        standing_points(_boxes(tracks), ground.camera, stairs) if in_image else np.concatenate([t.pos for t in tracks])
-    )
-    places = as_measured(feet, ground.camera)
+    places = _places(tracks, ground.camera, scene if camera is not None else None)
     _, labels, events = labels_and_events(tracks, fps, 1.0, rule, objective=objective, places=places)
     there = [moved_events(new, t.id, t.pos) for t, new in zip(tracks, events, strict=True)]
     return tuple(filled(with_velocities(tracks, fps), labels, there, objective=objective)), ground
+
+
+def people_in_metres(
+    tracks: Sequence[Tracks], fps: float, px_per_m: float, *, camera: Camera | None, scene: Scene | None,
+    source: str | None = None, image_size: tuple[int, int] | None = None,
+) -> TracksTable:  # fmt: skip
+    """Returns the table of people at the places from which `completed` derives groups; arguments as there."""
+    ground = ground_below(tracks, camera, px_per_m, source, image_size)
+    if ground.camera is None:
+        return tabulate(tracks, fps, px_per_m)
+    return tabulate(tracks, fps, 1.0, _places(tracks, ground.camera, scene if camera is not None else None))
+
+
+def _places(tracks: Sequence[Tracks], ground: Camera, scene: Scene | None) -> Array:
+    """Returns the ground points (R, 2), m, of all rows, as boxes measure them. scene: None if only boxes show the
+    ground, as these tell no place in the scene."""
+    if plane_of_run(tracks) == "image":
+        return as_measured(standing_points(_boxes(tracks), ground, scene), ground)
+    return as_measured(np.concatenate([t.pos for t in tracks]), ground)
 
 
 def _boxes(tracks: Sequence[Tracks]) -> Array:

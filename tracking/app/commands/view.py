@@ -60,8 +60,10 @@ def _pages(
     """Writes the page of each sequence; known: errors of the only run, by sequence, if they have been found."""
     from tracking.app.replay_page.page import Run, write_page
     from tracking.app.replay_page.video import page_video
+    from tracking.grouping.belief import Belief
     from tracking.app.report.moments import shown_errors
 
+    belief = None if options.belief is None else Belief.from_toml(options.belief)
     words = [*names] if len(names) > 1 else [""] * len(names)
     given = scoring_jobs(names.values(), sequences, options.box_scale)
     jobs = {sequence.name: job for sequence, job in zip(sequences, given, strict=True)}
@@ -70,7 +72,7 @@ def _pages(
         runs = read_runs(sequence, jobs[sequence.name])
         errors = [known.get(sequence.name) or shown_errors(sequence, run) for run in runs]
         shown = [Run(run, own.errors, word) for word, run, own in zip(words, runs, errors, strict=True)]
-        write_page(sequence, shown, path, page_video(sequence, path, options.video, step))
+        write_page(sequence, shown, path, page_video(sequence, path, options.video, step), belief=belief)
 
     return _write_each("view", sequences, options.out, ".html", write, by_picture=options.video != "none")
 
