@@ -13,6 +13,7 @@ Log-odds of events stay, as the answers tell nothing about when groups change.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -45,12 +46,32 @@ def features(pairs: ExplainedPairs) -> Array:
     return np.column_stack([np.ones(len(near)), near, other])
 
 
-def adapt(pairs: ExplainedPairs, answers: Answered) -> Belief:
-    """Returns the belief of `pairs`, adapted to the answers; at least one."""
-    x = features(pairs)
-    theta = fit_theta(x[answers.row], pairs.log_odds[answers.row], answers.together, answers.question)
-    belief = changed(pairs.belief, theta)
-    return replace(belief, threshold=expected_threshold(pairs.log_odds + x @ theta))
+@dataclass(frozen=True, slots=True, eq=False)
+class Adapted:
+    """A belief for one place, and how it was found."""
+
+    belief: Belief
+    theta: Array  # (3,)
+    right: tuple[int, int]  # answers with which the former and the adapted belief agree, by their mean log-odds
+    count: int  # answers
+
+
+def adapt(parts: Sequence[tuple[ExplainedPairs, Answered]]) -> Adapted:
+    """Returns the belief of the evidence, adapted to the answers. parts: evidence and answers about each recording, or
+    several about one; with at least one answer, and all by one belief."""
+    x = np.concatenate([features(pairs)[answers.row] for pairs, answers in parts])
+    log_odds = np.concatenate([pairs.log_odds[answers.row] for pairs, answers in parts])
+    together = np.concatenate([answers.together for _, answers in parts])
+    cut = np.cumsum([0, *(answers.question[-1] + 1 for _, answers in parts)])
+    question = np.concatenate([answers.question + k for (_, answers), k in zip(parts, cut, strict=False)])
+    theta = fit_theta(x, log_odds, together, question)
+    belief = changed(parts[0][0].belief, theta)
+    every = {pairs.people: pairs for pairs, _ in parts}.values()
+    threshold = expected_threshold(np.concatenate([pairs.log_odds + features(pairs) @ theta for pairs in every]))
+    before, after = (np.bincount(question, z) > 0 for z in (log_odds, log_odds + x @ theta))
+    said = np.bincount(question, together) > 0
+    right = int((before == said).sum()), int((after == said).sum())
+    return Adapted(replace(belief, threshold=threshold), theta, right, len(said))
 
 
 def fit_theta(x: Array, log_odds: Array, together: Bools, question: Ints) -> Array:

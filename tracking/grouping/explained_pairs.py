@@ -7,6 +7,7 @@ its means, as these tables are fitted together and only their sum has a meaning.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -66,16 +67,16 @@ def explain(table: TracksTable, fps: float, belief: Belief) -> ExplainedPairs:
     frame, column, pos = table.frame[seen], table.column[seen], table.pos[seen]
     size, shown = frames_per_step(fps), [NAMES.index(name) for name in VALUES]
     parts = quantity_parts(belief)
-    found = []
+    found = list[Any]()
     for rows in evidence(step_rows(frame, column, pos, table.length, fps), size / fps):
         terms = np.stack([part.log_odds(rows.values)[:, 0] for part in parts.values()], axis=1)
         whole, values = belief.log_odds(rows.values)[:, 0], rows.values[:, shown]
         found.append((rows.step, rows.a, rows.b, whole, terms.astype(np.float32), values.astype(np.float32)))
     none = np.zeros(0, np.int64)
     empty = (none, none, none, np.zeros(0), np.zeros((0, len(parts)), np.float32), np.zeros((0, len(VALUES))))
-    step, a, b, log_odds, terms, values = (np.concatenate(x) for x in zip(*(found or [empty]), strict=True))
-    order = np.lexsort((step, b, a))
-    step, a, b, log_odds, terms, values = (x[order] for x in (step, a, b, log_odds, terms, values))
+    columns = [np.concatenate(x) for x in zip(*(found or [empty]), strict=True)]
+    order = np.lexsort((columns[0], columns[2], columns[1]))
+    step, a, b, log_odds, terms, values = (x[order] for x in columns)
     pair = np.cumsum(np.append(False, (np.diff(a) != 0) | (np.diff(b) != 0)))[: len(a)]
     where = np.where(np.isfinite(table.pos), np.rint(100 * table.pos), -1).astype(np.int64)
     people = canonical_hash(("people", float(fps), table.length, table.frame, table.id, where))

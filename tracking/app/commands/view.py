@@ -60,8 +60,8 @@ def _pages(
     """Writes the page of each sequence; known: errors of the only run, by sequence, if they have been found."""
     from tracking.app.replay_page.page import Run, write_page
     from tracking.app.replay_page.video import page_video
-    from tracking.grouping.belief import Belief
     from tracking.app.report.moments import shown_errors
+    from tracking.grouping.belief import Belief
 
     belief = None if options.belief is None else Belief.from_toml(options.belief)
     words = [*names] if len(names) > 1 else [""] * len(names)

@@ -20,8 +20,8 @@ from sim.store.atomic import write_file
 from sim.store.tables import plain
 from sim.store.truth_files import spans
 from sim.types import Array, GroupEvent, Sequence, Tracks
-from tracking.app.replay_page.pair_columns import pair_columns
 from tracking.app.replay_page.page_rows import SCALE, Json, PageRows, deltas, encode_rows, rows_of_tracks, rows_of_truth
+from tracking.app.replay_page.pair_columns import pair_columns
 from tracking.app.replay_page.video import PageVideo
 from tracking.drawing.plan_view import plan_area
 from tracking.errors.found import FoundError
@@ -156,7 +156,7 @@ def page_data(sequence: Sequence, runs: SequenceOf[Run], span: tuple[int, int] |
 
 def _pairs(sequence: Sequence, runs: SequenceOf[Run], belief: Belief | None) -> Json:
     """Returns the evidence about pairs of people by side, of those sides that have it."""
-    people = {} if sequence.truth is None else {"truth": None}
+    people: dict[str, TrackingRun | None] = {} if sequence.truth is None else {"truth": None}
     people |= {side: TrackingRun(tuple(run.tracks), run.info) for side, run in zip(SIDES, runs, strict=False)}
     found = {side: pair_columns(sequence, run, belief) for side, run in people.items()}
     return {side: columns for side, columns in found.items() if columns is not None}

@@ -77,7 +77,7 @@ def shown_pairs(pairs: ExplainedPairs, most: int = MOST_ROWS) -> np.ndarray:
 
 
 def in_bytes(column: np.ndarray | Array, low: float, step: float) -> str:
-    """Returns a column (R,) as one byte each, in base64: the nearest of low, low + step, …, low + 254 step; nan: 255."""
+    """Returns a column (R,) as one byte each, in base64: steps of `step` from `low`, at most 254; nan is 255."""
     whole = np.rint((np.asarray(column, float) - low) / step).clip(0, UNKNOWN - 1)
     return base64.b64encode(np.where(np.isfinite(whole), whole, UNKNOWN).astype(np.uint8).tobytes()).decode()
 

@@ -1,4 +1,4 @@
-// Picks two people by clicks or lists, marks them, and shows why they are taken as together: the panel under the plan.
+// Picks two people by clicks or lists, marks them, and shows why they are taken as together: the panel beside the plan.
 
 const picked = { side: null, ids: [] };
 const NEAR_CLICK = { mouse: 12, touch: 26 }; // px
@@ -97,7 +97,7 @@ function layOutPair() {
   if (picked.ids.length < 2) return;
   const pairs = pairsOf[picked.side.name], stints = stintsOf(pairs, picked.ids);
   $("pair-chart").replaceChildren();
-  if (stints.length) pairLine = pairChart($("pair-chart"), Math.max($("pair").clientWidth - 22, 260), pairs, stints);
+  if (stints.length) pairLine = pairChart($("pair-chart"), Math.max($("pair-chart").clientWidth, 240), pairs, stints);
   $("pair-note").textContent = pairs.note;
 }
 
@@ -107,14 +107,14 @@ function showPair(frame) {
   const pairs = pairsOf[picked.side.name], stints = stintsOf(pairs, picked.ids), row = pairRowAt(pairs, stints, frame);
   const [a, b] = picked.ids;
   if (pairLine) pairLine(frame);
-  $("pair-title").textContent = `${a} and ${b}${row < 0 ? "" : `: together with ${percent(pairs.probability[row])}`}`;
+  $("pair-title").textContent = `${a} and ${b}${row < 0 ? "" : `: together with probability ${percent(pairs.probability[row])}`}`;
   $("pair-now").textContent = row < 0 ? absence(pairs, stints) : `at ${seconds(frame).toFixed(1)} s; together counts above ${percent(pairs.threshold)}`;
   if (row < 0) return $("pair-reasons").replaceChildren();
   const { named, rest } = reasonsOf(pairs, stints, row);
   const lines = [...named, [rest, "all else"], [pairs.bias, "before any evidence: most pairs are strangers"]];
   $("pair-reasons").replaceChildren(...lines.flatMap(([value, words]) => {
     const number = tag("dt", signed(value));
-    number.className = Number(value.toFixed(1)) < 0 ? "minus" : "plus";
+    number.style.color = palette[value < 0 ? 1 : 0];
     return [number, tag("dd", words)];
   }));
 }
@@ -186,7 +186,7 @@ function pairPlot({ svg, x, stints, frameOf, width }, top, height, ticks, unit, 
   for (const { column, words, dash, colour } of lines) {
     element("line", { x1: at, x2: at + 18, y1: top + 6, y2: top + 6, stroke: palette[colour], "stroke-width": 2.4, "stroke-dasharray": dash }, svg);
     element("text", { x: at + 23, y: top + 10 }, svg, words);
-    at += 36 + 6.6 * words.length;
+    at += 40 + 7 * words.length;
     for (const stint of stints) {
       let d = "", open = false;
       for (let k = 0; k < stint.count; k++) {
