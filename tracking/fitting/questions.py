@@ -70,8 +70,8 @@ def choose_questions(pairs: ExplainedPairs, count: int = COUNT, allowed: Bools |
     unsure = np.flatnonzero(np.abs(log_odds) < SURE)
     telling = [int(unsure[k]) for k in _telling(pairs, found.take(unsure), count - CHECKS)]
     checks = _checks(log_odds, count - len(telling))
-    order = [k for group in zip_longest(*(_parts(part, CHECKS) for part in (telling, checks)), fillvalue=[]) for k in
-             (*group[0], *group[1])]  # fmt: skip
+    parts = zip(*(np.array_split(np.array(part, np.int64), CHECKS) for part in (telling, checks)), strict=True)
+    order = [k for two in parts for k in np.concatenate(two).tolist()]
     return [_question(pairs, int(found.begin[k]), int(found.end[k])) for k in order]
 
 
@@ -120,19 +120,16 @@ def _telling(pairs: ExplainedPairs, found: Stretches, count: int) -> list[int]:
 
 
 def _checks(log_odds: Array, count: int) -> list[int]:
-    """Returns about `count` sure stretches, together and not in turn: of both those at even distances in the order of
-    their log-odds."""
-    sides = []
-    for sign in (1, -1):
-        side = np.flatnonzero(sign * log_odds >= SURE)
-        side = side[np.argsort(np.abs(log_odds[side]), kind="stable")]
-        share = min((count + (sign > 0)) // 2, len(side))
-        sides.append(side[np.linspace(0, len(side) - 1, share).round().astype(np.int64)].tolist())
-    return [k for two in zip_longest(*sides) for k in two if k is not None]
-
-
-def _parts(numbers: list[int], count: int) -> list[list[int]]:
-    return [part.tolist() for part in np.array_split(np.array(numbers, np.int64), count)]
+    """Returns at most `count` sure stretches, together and not in turn, as many of both as there are; of each kind
+    those at even distances in the order of their log-odds."""
+    sides = [np.flatnonzero(sign * log_odds >= SURE) for sign in (1, -1)]
+    most = min(-(-count // 2), len(sides[0]))
+    fewer = min(count - most, len(sides[1]))
+    picks = []
+    for side, share in zip(sides, (min(count - fewer, len(sides[0])), fewer), strict=True):
+        order = side[np.argsort(np.abs(log_odds[side]), kind="stable")]
+        picks.append(order[np.linspace(0, len(side) - 1, share).round().astype(np.int64)].tolist())
+    return [k for two in zip_longest(*picks) for k in two if k is not None]
 
 
 def _question(pairs: ExplainedPairs, begin: int, end: int) -> Question:
