@@ -72,7 +72,7 @@ def choose_questions(pairs: ExplainedPairs, count: int = COUNT, allowed: Bools |
     checks = _checks(log_odds, count - len(telling))
     parts = zip(*(np.array_split(np.array(part, np.int64), CHECKS) for part in (telling, checks)), strict=True)
     order = [k for two in parts for k in np.concatenate(two).tolist()]
-    return [_question(pairs, int(found.begin[k]), int(found.end[k])) for k in order]
+    return [question_of(pairs, int(found.begin[k]), int(found.end[k])) for k in order]
 
 
 def shown_stretches(pairs: ExplainedPairs) -> Stretches:
@@ -132,6 +132,7 @@ def _checks(log_odds: Array, count: int) -> list[int]:
     return [k for two in zip_longest(*picks) for k in two if k is not None]
 
 
-def _question(pairs: ExplainedPairs, begin: int, end: int) -> Question:
+def question_of(pairs: ExplainedPairs, begin: int, end: int) -> Question:
+    """Returns the question about the stretch of rows begin to end, exclusive."""
     first, last = (int(pairs.step[row]) * pairs.size for row in (begin, end - 1))
     return Question(int(pairs.a[begin]), int(pairs.b[begin]), first + 1, min(last + pairs.size, pairs.length))

@@ -35,7 +35,7 @@ def test_rows_of_the_stretches(tmp_path):
     first, second = (found.row[found.question == k] for k in (0, 1))
     assert PAIRS.step[first].tolist() == list(range(10, 21))
     assert set(PAIRS.a[first]) == {10}
-    assert PAIRS.step[second].tolist() == list(range(0, 11))
+    assert PAIRS.step[second].tolist() == list(range(11))
     assert set(PAIRS.b[second]) == {15}
     np.testing.assert_array_equal(found.together, found.question == 0)
 

@@ -83,7 +83,9 @@ def test_recordings_count_together():
     pairs = evidence_of(0, people=40)
     whole = answered(pairs, lambda p: p.pair % 3 == 0)
     first = whole.question < 10
-    halves = [Answered(whole.row[x], whole.question[x] - 10 * k, whole.together[x]) for k, x in ((0, first), (1, ~first))]
+    halves = [
+        Answered(whole.row[x], whole.question[x] - 10 * k, whole.together[x]) for k, x in ((0, first), (1, ~first))
+    ]
     one, two = adapt([(pairs, whole)]), adapt([(pairs, half) for half in halves])
     np.testing.assert_allclose(one.theta, two.theta)
     assert one.belief.toml_text() == two.belief.toml_text()

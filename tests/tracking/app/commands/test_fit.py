@@ -60,7 +60,8 @@ def answers_by_truth(source: Path, folder: Path, kinds: tuple[str, ...] = ("not"
     assert run(["view", str(source), "--out", str(page)]) == 0
     data = json.loads(re.findall(r'id="data">(.*?)</script>', page.read_text(), re.DOTALL)[0])
     (sequence,) = open_source(source)
-    group = {(f, p): g for f, p, g in zip(*(getattr(sequence.truth, k).tolist() for k in ("frame", "id", "group")))}
+    columns = (getattr(sequence.truth, name).tolist() for name in ("frame", "id", "group"))
+    group = {(f, p): g for f, p, g in zip(*columns, strict=True)}
     said = []
     for q in data["pairs"]["truth"]["questions"]:
         mates = group[q["first"], q["a"]] == group[q["first"], q["b"]] >= 0

@@ -20,6 +20,11 @@ TITLE = "document.getElementById('pair-title').textContent"
 ASKED = "document.getElementById('ask-title').textContent"
 HIDDEN = "document.getElementById('pair').hidden"
 REASONS = "[...document.querySelectorAll('#pair-reasons dt')].map(x => Number(x.textContent.replace('−', '-')))"
+# The frames before and after the replay goes back.
+AGAIN = """new Promise(done => { let last = 0; const look = () => {
+    const frame = Number(document.getElementById('seek').value);
+    if (frame < last) done([last, frame]);
+    else { last = frame; requestAnimationFrame(look); } }; look(); })"""
 # Where the people of the shown frame stand on the plan, px of the page, by id: as the page's own map has it.
 PLACES = """(() => {
     const data = JSON.parse(document.getElementById('data').textContent), raw = data.tracks, canvas = document.getElementById('plan');
@@ -74,6 +79,11 @@ def two_of_one_group(page: Page) -> list[tuple[int, float, float]]:
 
 
 def click(page: Page, x: float, y: float) -> None:
+    """A click; on the narrow page the touch of a finger, 8 px off."""
+    if page.value("innerWidth") < 600:
+        page.send("Input.dispatchTouchEvent", type="touchStart", touchPoints=[{"x": x, "y": y - 8}])
+        page.send("Input.dispatchTouchEvent", type="touchEnd", touchPoints=[])
+        return
     for kind in ("mousePressed", "mouseReleased"):
         page.send("Input.dispatchMouseEvent", type=kind, x=x, y=y, button="left", clickCount=1)
 
@@ -105,8 +115,8 @@ def test_a_pair_is_chosen_from_the_lists(page: Page) -> None:
     page.wait(f"!{HIDDEN}")
     svg = "document.querySelector('#pair-chart svg')"
     before = page.value("document.getElementById('seek').value")
-    x, y = page.value(f"(() => {{ {svg}.scrollIntoView({{ block: 'center' }}); const r = {svg}.getBoundingClientRect(); "
-                      "return [r.left + 0.5 * r.width, r.top + 40] })()")  # fmt: skip
+    page.value(f"{svg}.scrollIntoView({{ block: 'center' }})")
+    x, y = page.value(f"(box => [box.left + 0.5 * box.width, box.top + 40])({svg}.getBoundingClientRect())")
     click(page, x, y)
     page.wait(f"document.getElementById('seek').value !== {before!r}")
 
@@ -119,7 +129,11 @@ def test_labels_by_keys_are_saved_and_fitted(
     page.value("document.getElementById('ask-start').click()")
     count = int(page.value(ASKED).split()[2].rstrip(":"))
     assert count >= 10
-    page.wait("document.getElementById('seek').value !== '1'")
+    questions = "JSON.parse(document.getElementById('data').textContent).pairs.tracks.questions"
+    _, _, first, last = page.value(f"Object.values({questions}[0])")
+    page.value("{ const s = document.getElementById('speed'); s.value = 8; s.dispatchEvent(new Event('change')) }")
+    before, after = page.value(AGAIN)
+    assert first <= after < before <= last, "the stretch repeats"
     for key in "122u3":
         page.press(key)
     assert page.value(ASKED).startswith(f"4 of {count}")
