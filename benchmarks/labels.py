@@ -29,7 +29,7 @@ from scenarios.loading.resolve import resolve
 from sim.types import Array, Bools, Ints, Truth
 from tracking.fitting import place_belief, questions
 from tracking.fitting.grouping_scenes import simulated
-from tracking.fitting.place_belief import SPREAD, Answered, adapt
+from tracking.fitting.place_belief import Answered, adapt
 from tracking.fitting.questions import COUNT, Question, choose_questions, shown_stretches
 from tracking.grouping.belief import Belief, default_belief
 from tracking.grouping.explained_pairs import ExplainedPairs, explain
@@ -40,7 +40,7 @@ from tracking.recordings.source import open_source
 ALLOWED = 0.8  # Share of the pairs from which the questions of a draw come.
 WRONG = 0.1  # Share of wrong answers.
 LEAST_PAIRS = 80
-SPREADS = ((1e-6, 1e-6, 1e-6), (1.0, 0.2, 0.2), (1.0, 0.3, 0.3), tuple(SPREAD.tolist()), (2.0, 0.5, 0.5))
+SPREADS = ((1e-6, 1e-6, 1e-6), (1.0, 0.2, 0.2), (1.0, 0.3, 0.3), (1.0, 0.5, 0.5), (2.0, 0.5, 0.5))
 
 
 @dataclass(frozen=True, eq=False)

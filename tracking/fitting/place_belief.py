@@ -25,7 +25,7 @@ from tracking.grouping.belief import Belief
 from tracking.grouping.explained_pairs import ExplainedPairs, quantity_of
 
 PLACE = ("distance", "sideways", "lengthwise")  # Quantities of theta_1; all others are of theta_2.
-SPREAD = np.array([1.0, 0.5, 0.5])  # Standard deviations of the priors of theta; `benchmarks labels` compares others.
+SPREAD = np.array([1.0, 0.3, 0.3])  # Standard deviations of the priors of theta; `benchmarks labels` compares others.
 PRECISION = np.diag(SPREAD**-2)  # Of the prior.
 SLIP = 0.05  # Probability that an answer is wrong.
 
