@@ -88,7 +88,8 @@ def _recording_of(file: AnswerFile, recordings: Mapping[str, ExplainedPairs]) ->
         if pairs.people == file.people:
             return pairs
     known = ", ".join(f"{name}, {counted(pairs.length, 'frame')}" for name, pairs in recordings.items())
-    got, remedy = f"other people: of {file.recording}, {counted(file.frames, 'frame')}", "give SOURCE as to `view`"
+    got = f"other people: of {file.recording}, {counted(file.frames, 'frame')}"
+    remedy = "give the source or the tracks of the page, with the options of `view`"
     raise InputError(file=file.path, place="people", got=got, expected=f"those of {known}", remedy=remedy)
 
 

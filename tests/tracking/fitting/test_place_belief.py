@@ -67,7 +67,7 @@ def test_theta_changes_the_tables_of_now_alone():
     np.testing.assert_allclose(whole, expected, atol=1e-4)
 
 
-@pytest.mark.parametrize("shares", [[0.9] * 50, [0.1, 0.3, 0.6, 0.95] * 20])
+@pytest.mark.parametrize("shares", [[0.9] * 50, [0.1, 0.3, 0.6, 0.95] * 20, [0.95] * 20 + [0.4] * 40])
 def test_the_threshold_is_best_for_the_expected_f1(shares):
     p = np.array(shares)
     found = expected_threshold(np.log(p / (1 - p)))

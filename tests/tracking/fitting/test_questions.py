@@ -67,7 +67,7 @@ def test_stretches_end_at_long_pauses_and_stay_around_the_nearest_moment(monkeyp
     pairs = evidence_of(0, people=2, frames=60)
     gap = pairs.take(np.flatnonzero((pairs.step < 20) | (pairs.step > 26)))
     found = shown_stretches(gap)
-    assert gap.step[found.begin].tolist() == [27] or gap.step[found.begin] > 27
+    assert gap.step[found.begin[0]] >= 27, "the longer of two stretches"
     values = gap.values.copy()
     values[gap.step == 50, 0] = 0.01
     monkeypatch.setattr(questions, "LONGEST", 4.0)

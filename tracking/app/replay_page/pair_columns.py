@@ -87,8 +87,10 @@ def _note(run: TrackingRun | None, belief: Belief) -> str:
     made = None if run is None else run.info.get("grouping")
     if run is None or (made is not None and made.get("hash") == belief.as_dict()["hash"]):
         return ""
+    if made is None and not run.info:
+        return "What made the groups is not stated. This is what the belief says."
     if made is None:
-        return "The tracker names its groups itself, or they were stored without it. This is what the belief says."
+        return "The tracker names its groups itself. This is what the belief says."
     if made.get("grouping") == KIND:
         return "Another belief made the groups. Name its file with --grouping to see its evidence."
     return "The baseline rule made the groups. This is what the belief says."

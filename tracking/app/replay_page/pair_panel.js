@@ -58,7 +58,10 @@ function listenToPicks() {
   $("pair-b").addEventListener("change", () => {
     picked.ids = [picked.ids[0], ...($("pair-b").value ? [Number($("pair-b").value)] : [])];
     layOutPair();
-    show();
+    const pairs = pairsOf[picked.side.name], stints = picked.ids.length < 2 ? [] : stintsOf(pairs, picked.ids);
+    // where the two are near each other, if they are not now
+    if (stints.length && pairRowAt(pairs, stints, state.frame) < 0) jump(stints[0].step * pairs.size + 1);
+    else show();
   });
   $("pair-clear").addEventListener("click", letGo);
 }
@@ -109,6 +112,7 @@ function showPair(frame) {
   if (pairLine) pairLine(frame);
   $("pair-title").textContent = `${a} and ${b}${row < 0 ? "" : `: together with probability ${percent(pairs.probability[row])}`}`;
   $("pair-now").textContent = row < 0 ? absence(pairs, stints) : `at ${seconds(frame).toFixed(1)} s; together counts above ${percent(pairs.threshold)}`;
+  $("pair-about").hidden = row < 0;
   if (row < 0) return $("pair-reasons").replaceChildren();
   const { named, rest } = reasonsOf(pairs, stints, row);
   const lines = [...named, [rest, "all else"], [pairs.bias, "before any evidence: most pairs are strangers"]];
@@ -143,7 +147,7 @@ function pairChart(box, width, pairs, stints) {
   y = pairPlot(place, y, 64, [0, 2, 4], "m", lines([["distance", "distance", "", 0], ["sideways", "sideways", "5 3", 1], ["lengthwise", "lengthwise", "1 3", 3]]));
   y = pairPlot(place, y, 44, [0, 1, 2], "m/s", lines([["velocity difference", "velocity difference", "", 2]]));
   y = pairPlot(place, y, 60, [0, 0.5, 1], "", [{ column: pairs.probability, words: "probability", dash: "", colour: 4 }], pairs.threshold);
-  for (const [words, holds, colour] of pairLanes()) {
+  for (const [words, holds, colour] of pairLanes(from, to)) {
     element("text", { x: CHART.gutter, y: y + 4, fill: theme.thing }, svg, words);
     for (const [a, b] of stretchesOf(from, to, holds)) {
       element("rect", { class: "lane", x: x(a), y: y + 8, width: Math.max(x(Math.min(b + 1, to)) - x(a), 2), height: 8, rx: 3, fill: palette[colour] }, svg);
@@ -167,11 +171,13 @@ function pairChart(box, width, pairs, stints) {
 }
 
 // When the two are reported, and truly, in one group: [words, condition on a frame, colour].
-function pairLanes() {
-  const { side, ids } = picked, lanes = [[`${side.word}: in one group`, frame => inOneGroup(side, ids, frame), side.tracked ? 5 : 0]];
+function pairLanes(from, to) {
+  const unlabelled = data.unlabelled.some(([a, b]) => a <= from && to <= b);
+  const words = side => `${side.word}: ${side === truth && unlabelled ? "groups are not labelled" : "in one group"}`;
+  const { side, ids } = picked, lanes = [[words(side), frame => inOneGroup(side, ids, frame), side.tracked ? 5 : 0]];
   for (const rest of sides) {
     if (rest === side || rest.groupRows || rest.plane !== side.plane || side.plane !== "ground") continue;
-    lanes.push([`${rest.word}: in one group`, frame => inOneGroupOf(rest, side, ids, frame), rest.tracked ? 5 : 0]);
+    lanes.push([words(rest), frame => inOneGroupOf(rest, side, ids, frame), rest.tracked ? 5 : 0]);
   }
   return lanes;
 }

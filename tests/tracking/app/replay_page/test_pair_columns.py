@@ -9,6 +9,7 @@ import pytest
 
 from sim.types import Sequence, Tracks
 from tests.near_pairs import evidence_of
+from tracking.app.replay_page import pair_columns as module
 from tracking.app.replay_page.page import write_page
 from tracking.app.replay_page.pair_columns import in_bytes, pair_columns, shown_pairs
 from tracking.fitting.place_belief import changed
@@ -42,6 +43,15 @@ def test_columns_come_back(sequence: Sequence) -> None:
     assert {q["a"] for q in found["questions"]} <= set(pairs.a.tolist())
 
 
+def test_a_pair_that_comes_back_has_a_stint_for_each_time(sequence: Sequence, monkeypatch: pytest.MonkeyPatch) -> None:
+    pairs = evidence_of(0, people=2)
+    seen = pairs.take(np.flatnonzero(pairs.step % 20 != 7))
+    monkeypatch.setattr(module, "explained_people", lambda *_: seen)
+    assert pair_columns(sequence, None)["stints"] == [
+        [10, 11, 0, 7], [10, 11, 8, 19], [10, 11, 28, 19], [10, 11, 48, 12],
+    ]  # fmt: skip
+
+
 def test_bytes_end_at_their_range() -> None:
     column = np.array([-9.0, 0.0, 1.004, np.nan, 99.0])
     np.testing.assert_array_equal(numbers(in_bytes(column, 0.0, 0.02), (0, 0.02)), [0, 0, 1.0, np.nan, 5.08])
@@ -67,7 +77,8 @@ def test_the_page_says_whose_groups_and_whose_evidence(sequence: Sequence, track
     assert note(sequence, group(sequence, grouping=other), other) == ""
     assert "--grouping" in note(sequence, group(sequence, grouping=other))
     assert "rule" in note(sequence, group(sequence, grouping=LinkRule()))
-    assert "names its groups itself" in note(sequence, TrackingRun(tuple(tracks)))
+    assert "not stated" in note(sequence, TrackingRun(tuple(tracks)))
+    assert "names its groups itself" in note(sequence, TrackingRun(tuple(tracks), {"tracker": "joint"}))
     shown = pair_columns(sequence, None, other)
     assert shown["bias"] == pytest.approx(default_belief().bias[0] + 0.5, abs=0.01)
 
