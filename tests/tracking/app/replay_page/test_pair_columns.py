@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import base64
+import json
+import re
 
 import numpy as np
 import pytest
 
 from sim.types import Sequence, Tracks
+from tests.groups_as_wholes import wholes
 from tests.near_pairs import evidence_of
 from tracking.app.replay_page import pair_columns as module
-from tracking.app.replay_page.page import write_page
+from tracking.app.replay_page.page import Run, write_page
 from tracking.app.replay_page.pair_columns import in_bytes, pair_columns, shown_pairs
 from tracking.fitting.place_belief import changed
 from tracking.grouping.belief import default_belief
@@ -87,3 +90,6 @@ def test_without_people_there_is_no_evidence(sequence: Sequence, tmp_path) -> No
     bare = Sequence("bare", 10.0, 5, lambda: iter(()))
     assert '"pairs":{}' in write_page(bare, [], tmp_path / "bare.html").read_text()
     assert pair_columns(sequence, TrackingRun(())) is None
+    page = write_page(sequence, [Run(wholes(sequence, "ground"))], tmp_path / "page.html").read_text()
+    data = json.loads(re.findall(r'id="data">(.*?)</script>', page, re.DOTALL)[0])
+    assert data["pairs"].keys() == {"truth"}, "not of whole groups"
