@@ -316,6 +316,9 @@ class ViewOptions(BoxOptions, words="view"):
         "Pictures inside the page, beside it as FILE.view.mp4, or none. auto: beside from 12 MB on.", "auto")
     by: str | None = option(
         "The score that ranks in a report. Default: objective, or what all runs have of it.", None, metavar="SCORE")
+    belief: Path | None = option(
+        "Belief whose evidence about two people is shown: file of `fit grouping`. Default: the default belief.", None,
+        metavar="FILE.toml", flag="--grouping")
     camera: Path | None = CAMERA()
     workers: int = PROCESSES()
 
@@ -433,13 +436,20 @@ class FitJointOptions(Options, words="fit joint", run="fit:fit_joint"):
     seeds: str = SEEDS("Seeds of the scenes to fit to.", "30000:30002")
 
 
-class FitGroupingOptions(FitJointOptions, words="fit grouping", run="fit:fit_grouping"):
-    """Fit the belief of who belongs together to simulated scenes."""
+class FitGroupingOptions(FitJointOptions, BoxOptions, words="fit grouping", run="fit:fit_grouping"):
+    """Fit the belief of who belongs together to simulated scenes, or adapt it to a place by answers about pairs."""
 
+    names: list[str] = ARGUMENT(
+        "Scenarios, *.toml files or suites; with --labels, the recordings or tracks of the answers.",
+        metavar="NAME…|SOURCE…")
     out: Path = TOML("File to write, for --grouping.")
+    labels: list[Path] = option(
+        "Answers that a page of `view` saved. The default belief is adapted to them. Can be given several times.", [],
+        metavar="FILE.json", flag="--labels")
     events: list[str] = option(
         "Fit the log-odds of events to this scenario or suite. Can be given several times. Default: the NAMEs.", [],
         metavar="NAME", flag="--events")
+    camera: Path | None = CAMERA()
 
 
 class FitRelationalOptions(Options, words="fit relational", run="fit:fit_relational"):

@@ -25,6 +25,7 @@ from tracking.grouping.grouped_tracks import (
     with_velocities,
 )
 from tracking.grouping.grouping_choice import Grouping
+from tracking.grouping.tracks_table import TracksTable, tabulate
 
 FEETLESS = ("pixels", "stereo")  # Inputs of trackers whose boxes do not end at people's feet.
 
@@ -86,11 +87,27 @@ def completed(
     ground = ground_below(tracks, camera, px_per_m, source, image_size)
     if ground.camera is None:
         return with_groups(tracks, fps, px_per_m, rule, objective=objective), ground
-    stairs = None if camera is None else scene  # the boxes tell no place in the scene
-    places = standing_points(_boxes(tracks), ground.camera, stairs)
+    places = _places(tracks, ground.camera, scene if camera is not None else None)
     _, labels, events = labels_and_events(tracks, fps, 1.0, rule, objective=objective, places=places)
     there = [moved_events(new, t.id, t.pos) for t, new in zip(tracks, events, strict=True)]
     return tuple(filled(with_velocities(tracks, fps), labels, there, objective=objective)), ground
+
+
+def people_in_metres(
+    tracks: Sequence[Tracks], fps: float, px_per_m: float, *, camera: Camera | None, scene: Scene | None,
+    source: str | None = None, image_size: tuple[int, int] | None = None,
+) -> TracksTable:  # fmt: skip
+    """Returns the table of people at the places from which `completed` derives groups; arguments as there."""
+    ground = ground_below(tracks, camera, px_per_m, source, image_size)
+    if ground.camera is None:
+        return tabulate(tracks, fps, px_per_m)
+    return tabulate(tracks, fps, 1.0, _places(tracks, ground.camera, scene if camera is not None else None))
+
+
+def _places(tracks: Sequence[Tracks], ground: Camera, scene: Scene | None) -> Array:
+    """Returns the ground points (R, 2), m, of all rows. scene: None if only boxes show the ground, as these tell no
+    place in the scene."""
+    return standing_points(_boxes(tracks), ground, scene)
 
 
 def _boxes(tracks: Sequence[Tracks]) -> Array:

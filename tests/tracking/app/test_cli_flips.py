@@ -457,6 +457,7 @@ ELSEWHERE = {
     ("track", "step_timeout"),  # tests/tracking/running/test_time_limit.py
     ("view", "by"),  # report/test_in_browser.py
     ("view", "workers"),
+    ("view", "belief"),  # replay_page/test_pair_columns_in_browser.py
     # tests/tracking/recordings/test_mot_people.py
     *((name, "person_class") for name in ("coco", "score", "track", "view", "sheet", "overlay")),
     *((name, "person_class") for name in ("csv", "parquet", "trajnet", "pedpy")),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import printable
+from scenarios.errors import InputError, printable
 from sim.store.own_files import output_file
 from sim.types import Truth
 from tracking.app import option_parsing
@@ -19,6 +19,10 @@ from tracking.app.command_result import CommandResult
 
 # Seeds of the simulated detections whose statistics are shown beside the measured ones.
 CHECK_SEEDS = range(30_000, 30_008)
+
+# Options on how the people of answers are read.
+READING = ("fps", "px_per_m", "person_class", "box_scale", "camera")
+SIMULATED = "they are for SOURCE with --labels"
 
 
 def fit_sensor(options: FitSensorOptions) -> CommandResult:
@@ -52,12 +56,17 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
 
 
 def fit_grouping(options: FitGroupingOptions) -> CommandResult:
-    """Writes the belief fitted to simulated scenes as a TOML file, with the command and its scores as comments."""
+    """Writes the belief fitted to simulated scenes as a TOML file, with the command and its scores as comments; with
+    `labels`, the default belief adapted to the answers."""
+    if options.labels:
+        return _adapt_grouping(options)
     from sim.store.atomic import write_file
     from tracking.fitting.belief import fit_belief, sample_of, shifts_of_sample
     from tracking.fitting.belief_scores import belief_scores
     from tracking.fitting.grouping_scenes import pair_scenes
+    from tracking.recordings.options import refuse_options
 
+    refuse_options(vars(options), " ".join(READING), Path(options.names[0]), "a fit without --labels", SIMULATED)
     out, seeds = output_file(options.out, ".toml"), option_parsing.seeds(options.seeds)
     sample = sample_of(list(pair_scenes(options.names, seeds)))
     changes = sample_of(list(pair_scenes(options.events, seeds))) if options.events else None
@@ -68,6 +77,43 @@ def fit_grouping(options: FitGroupingOptions) -> CommandResult:
     comments = _comments("grouping", options, asked, scores)
     write_file(out, belief.toml_text("\n".join(comments)).encode())
     return CommandResult({"file": out, "fitted": scores}, "\n".join([*comments[1:], _use("--grouping", out)]))
+
+
+def _adapt_grouping(options: FitGroupingOptions) -> CommandResult:
+    """Writes the default belief, adapted to the answers about people of the sources."""
+    from sim.store.atomic import write_file
+    from tracking.app.commands.group import opened_people
+    from tracking.fitting.pair_answers import AnswerFile, answered_rows
+    from tracking.fitting.place_belief import adapt
+    from tracking.grouping.belief import default_belief
+    from tracking.running.explained_people import explained_people
+
+    if options.events:
+        remedy = "leave --events out: answers tell nothing about events"
+        raise InputError(place="--events", got="it with --labels", expected="one of the two", remedy=remedy)
+    out, files = output_file(options.out, ".toml"), [AnswerFile.read(path) for path in options.labels]
+    recordings, before = {}, default_belief()
+    for name in options.names:
+        for sequence, stored in zip(*opened_people(options, Path(name)), strict=True):
+            run = None if stored is None else stored.read(sequence)
+            recordings[sequence.name] = explained_people(sequence, run, before)
+    found = adapt(answered_rows(files, recordings))
+    belief, (bias, near, motion) = found.belief, found.theta.tolist()
+    asked = [word for path in options.labels for word in ("--labels", str(path))]
+    lines = [f"{printable(file.recording)}: {file.counts()}" for file in files]
+    lines += [
+        f"the default belief agrees with {found.right[0]} of {found.count} answers, the adapted one with "
+        f"{found.right[1]}",
+        f"bias {bias:+.2f}, place × {1 + near:.2f}, motion and time × {1 + motion:.2f}, threshold "
+        f"{before.threshold:g} → {belief.threshold:g}",
+    ]
+    if len({x.answer for file in files for x in file.answers} - {"don't know"}) == 1:
+        lines.append("all answers are of one kind: answer about other pairs, too")
+    comments = [shlex.join(["flockscope", "fit", "grouping", *options.names, *asked]), *lines]
+    write_file(out, belief.toml_text("\n".join(comments)).encode())
+    fitted: dict[str, float] = {"answers": found.count, "agreed before": found.right[0], "agreed": found.right[1]}
+    fitted |= {"bias": bias, "place": 1 + near, "motion": 1 + motion, "threshold": belief.threshold}
+    return CommandResult({"file": out, "fitted": fitted}, "\n".join([*lines, _use("--grouping", out)]))
 
 
 def _simulated(names: Iterable[str], seeds: range) -> Iterator[tuple[int, Truth]]:

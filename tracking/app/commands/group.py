@@ -7,7 +7,7 @@ from pathlib import Path
 
 from scenarios.errors import InputError
 from sim.types import Sequence
-from tracking.app.command_options import GroupOptions
+from tracking.app.command_options import FitGroupingOptions, GroupOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.group_tables import group_row, group_tables
 from tracking.app.progress import ProgressMeter
@@ -17,6 +17,8 @@ from tracking.grouping.belief import Belief, pair_probabilities
 from tracking.grouping.grouping_choice import default_grouping, grouping_of
 from tracking.recordings.options import refuse_options
 from tracking.running import run as runs
+
+Peopled = GroupOptions | FitGroupingOptions
 
 # Kind of a source whose rows are anybody's tracks: the run may be scored with the labels of any sequence.
 TEXT = "mot text"
@@ -29,7 +31,7 @@ def group(options: GroupOptions) -> CommandResult:
     if options.probabilities and not isinstance(belief, Belief):
         expected, remedy = "a grouping with probabilities", "leave --grouping out, or name a file of `fit grouping`"
         raise InputError(place="--probabilities", got="the baseline rule", expected=expected, remedy=remedy)
-    sequences, stored = _opened(options)
+    sequences, stored = opened_people(options, options.source)
     folders = run_folders(sequences, options.source, options.out)
     for folder, tracks in zip(folders, stored, strict=True):
         if tracks is not None and folder.resolve() in (tracks.path.resolve(), tracks.path.resolve().parent):
@@ -50,12 +52,12 @@ def group(options: GroupOptions) -> CommandResult:
     return CommandResult({"runs": rows}, group_tables(rows))
 
 
-def _opened(options: GroupOptions) -> tuple[list[Sequence], list[StoredTracks | None]]:
-    """Returns the sequences of the source, and for each its run if the source is stored tracks of ours, else None."""
-    if not holds_tracks(options.source):
-        sequences = _open(options.source, options)
+def opened_people(options: Peopled, source: Path) -> tuple[list[Sequence], list[StoredTracks | None]]:
+    """Returns the sequences of a source, and for each its run if the source is stored tracks of ours, else None."""
+    if not holds_tracks(source):
+        sequences = _open(source, options)
         return sequences, [None] * len(sequences)
-    sequences, found = [], find_tracks(options.source)
+    sequences, found = [], find_tracks(source)
     for tracks in found:
         if tracks.info:
             sequences.append(_of_run(tracks, options))
@@ -65,7 +67,7 @@ def _opened(options: GroupOptions) -> tuple[list[Sequence], list[StoredTracks | 
     return sequences, [tracks if tracks.info else None for tracks in found]
 
 
-def _open(path: Path, options: GroupOptions) -> list[Sequence]:
+def _open(path: Path, options: Peopled) -> list[Sequence]:
     sequences = source_of(options, path).open()
     if options.box_scale is not None and any(s.source["kind"] != TEXT for s in sequences):
         got, remedy = "a recording, whose labels are not scaled", "leave it out, or give the text itself"
@@ -73,7 +75,7 @@ def _open(path: Path, options: GroupOptions) -> list[Sequence]:
     return sequences
 
 
-def _of_run(tracks: StoredTracks, options: GroupOptions) -> Sequence:
+def _of_run(tracks: StoredTracks, options: Peopled) -> Sequence:
     known = "px_per_m" if tracks.info.get("plane") != "image" else ""
     refuse_options(vars(options), f"camera person_class box_scale {known}", tracks.folder, "a run", STATED)
     sequence = tracks.sequence(options.fps)

@@ -17,6 +17,7 @@ from tracking.app.score_tables import checked_key
 from tracking.app.scored_sequence import read_runs, run_names, scale_of_texts, scoring_jobs
 from tracking.app.sequence_workers import over_sequences, source_of
 from tracking.app.stored_tracks import find_tracks, match_tracks
+from tracking.grouping.belief import Belief
 
 if TYPE_CHECKING:
     from tracking.errors.found import RunErrors
@@ -34,13 +35,14 @@ def view(options: ViewOptions) -> CommandResult:
     """Writes a replay page for each sequence, with its tracks if they are given, and a report on several sequences."""
     if options.by is not None:
         checked_key(options.by)
+    belief = None if options.belief is None else Belief.from_toml(options.belief)
     sequences = source_of(options, options.source, images=True, without="box_scale").open()
     names = run_names(options.tracks)
     if len(sequences) == 1:
         if len(names) > 2:
             got, expected = counted(len(names), "run"), "one or two for a single sequence"
             raise InputError(place="TRACKS", got=got, expected=expected, remedy="give two, or the whole dataset")
-        return _pages(options, sequences, names)
+        return _pages(options, sequences, names, belief)
     written = sequences if len(names) < 2 else []  # of several runs a report alone is written
     _files(written, _folder(options.out, ".html", len(sequences)), ".html")  # refuses files of others before all work
     unlabelled = next((sequence.name for sequence in sequences if sequence.load_truth is None), None)
@@ -48,16 +50,18 @@ def view(options: ViewOptions) -> CommandResult:
         expected, remedy = "labels, by which several runs are compared", "give one run, or one sequence"
         raise InputError(file=unlabelled, got="no labels", expected=expected, remedy=remedy)
     write = _report if names and unlabelled is None else _pages
-    return write(options, sequences, names)
+    return write(options, sequences, names, belief)
 
 
 def _pages(
     options: ViewOptions,
     sequences: list[Sequence],
     names: Mapping[str, str],
+    belief: Belief | None,
     known: Mapping[str, RunErrors] = MappingProxyType({}),
 ) -> CommandResult:
-    """Writes the page of each sequence; known: errors of the only run, by sequence, if they have been found."""
+    """Writes the page of each sequence. belief: whose evidence is shown, None: the default; known: errors of the only
+    run, by sequence, if they have been found."""
     from tracking.app.replay_page.page import Run, write_page
     from tracking.app.replay_page.video import page_video
     from tracking.app.report.moments import shown_errors
@@ -70,12 +74,14 @@ def _pages(
         runs = read_runs(sequence, jobs[sequence.name])
         errors = [known.get(sequence.name) or shown_errors(sequence, run) for run in runs]
         shown = [Run(run, own.errors, word) for word, run, own in zip(words, runs, errors, strict=True)]
-        write_page(sequence, shown, path, page_video(sequence, path, options.video, step))
+        write_page(sequence, shown, path, page_video(sequence, path, options.video, step), belief=belief)
 
     return _write_each("view", sequences, options.out, ".html", write, by_picture=options.video != "none")
 
 
-def _report(options: ViewOptions, sequences: list[Sequence], names: Mapping[str, str]) -> CommandResult:
+def _report(
+    options: ViewOptions, sequences: list[Sequence], names: Mapping[str, str], belief: Belief | None
+) -> CommandResult:
     """Writes index.html, the report on all runs; for one run it links to the pages of the sequences."""
     from tracking.app.report.of_runs import judge, report_of_runs
     from tracking.app.report.page import check_packages, write_report
@@ -88,7 +94,7 @@ def _report(options: ViewOptions, sequences: list[Sequence], names: Mapping[str,
     found = list(over_sequences("report", judge, sequences, jobs, source, options.workers))
     if len(names) == 1:
         known = {sequence.name: one.errors[0] for sequence, one in zip(sequences, found, strict=True)}
-        pages = _pages(options, sequences, names, known)
+        pages = _pages(options, sequences, names, belief, known)
     addresses = [address(Path(path.name)) for path in pages.data["files"]]
     files = dict(zip((sequence.name for sequence in sequences), addresses, strict=False))
     write_report(report_of_runs([*names], sequences, found, options.by, files), index)

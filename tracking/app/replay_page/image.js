@@ -28,13 +28,20 @@ function imagePane(pane, shown) {
   if (pane.options.detections && found) drawImageDetections(pane);
   for (const side of people) if (side.tracked || !data.opening) drawImageBoxes(pane, side);
   if (pane.options.ids) for (const [side, map] of wholeGroups) drawWholeGroupIds(pane, side, map);
-  drawErrorsHere(pane, shown, 7, (side, row) => cornersOf(side, row, pane.scale));
+  drawPicked(pane, shown, (side, row) => around(cornersOf(side, row, pane.scale)));
+  if (!asking) drawErrorsHere(pane, shown, 7, (side, row) => cornersOf(side, row, pane.scale));
 }
 
 // The corners, in px, of a box, or of a ring round the feet of somebody without one.
 function cornersOf(side, row, scale) {
   const box = boxOf(side, row, scale);
   return box ? [[0, 0], [1, 0], [0, 1], [1, 1]].map(([p, q]) => [box[0] + p * box[2], box[1] + q * box[3]]) : footRing(side, row, scale);
+}
+
+// Left, top, right and bottom of points.
+function around(points) {
+  const us = points.map(p => p[0]), vs = points.map(p => p[1]);
+  return [Math.min(...us), Math.min(...vs), Math.max(...us), Math.max(...vs)];
 }
 
 // The points, in px, of a ring on the ground round a person's feet; [] where the camera cannot see it.
@@ -66,6 +73,7 @@ function drawImageBoxes(pane, side) {
   for (const row of rows) {
     const ids = options.ids && rows.length <= MANY && shownIn(pane, cornersOf(side, row, scale));
     const colour = rowColour(side, row, options.by), box = boxOf(side, row, scale);
+    addHit("image", ctx, side, row, around(cornersOf(side, row, scale)));
     ctx.strokeStyle = colour;
     ctx.lineWidth = tracked ? 2.4 : 1.8;
     ctx.setLineDash(tracked ? [6, 4] : []);

@@ -20,6 +20,7 @@ const KEYS = [
   ...TOGGLES.filter(toggle => toggle[3]).map(([, word, key]) => [key, word.toLowerCase()]), ["?", "this list"],
 ];
 if (data.errors.length) KEYS.push(["x z", "next, previous error"]);
+if (Object.keys(pairsOf).length) KEYS.push(["click", "a person, then another: why together"], ["Esc", "let go of them"]);
 const events = sides.flatMap(side => side.events).sort((a, b) => a.start - b.start);
 let line = null, eventButtons = [], errorButtons = [];
 
@@ -32,6 +33,7 @@ function show() {
   const frame = state.frame;
   $("stages").classList.toggle("beside", options.beside && sides.filter(side => options[side.name]).length > 1);
   if (data.opening) follow();
+  hits.plan = [];
   if (hasPlan) drawPlan($("plan"), frame, options);
   showImage();
   if (line) line.move(frame);
@@ -40,12 +42,14 @@ function show() {
   showErrors(frame);
   $("clock").value = `${frame} / ${data.length} · ${seconds(frame).toFixed(2)} s`;
   showFacts(frame);
+  showPair(frame);
 }
 
 // The image shows the video's frame, which may arrive a moment after it was wanted.
 function showImage() {
   if (!hasImage) return;
   if (videoShown() && !(state.playing && player.canPlay)) player.seek(state.frame);
+  hits.image = [];
   drawImage($("image"), videoShown() && player.frame ? player.frame : state.frame, options);
 }
 
@@ -68,7 +72,7 @@ function onVideoChange() {
   if (!state.playing || !player.canPlay) return showImage();
   state.frame = player.frame;
   show();
-  if (state.frame >= data.to) end();
+  if (state.frame >= playedSpan()[1]) end();
 }
 
 function showFacts(frame) {
@@ -124,9 +128,10 @@ function play(on) {
   $("play").querySelector("path").setAttribute("d", on ? "M3 2h4v12H3z M9 2h4v12H9z" : "M4 2v12l10-6z");
   $("play").setAttribute("aria-label", on ? "Pause" : "Play");
   if (!on) return player && player.pause();
-  if (state.frame >= data.to) {
+  const [from, to] = playedSpan();
+  if (state.frame >= to || state.frame < from) {
     state.playing = false; // so that the video goes back as well
-    seekTo(data.from);
+    seekTo(from);
     state.playing = true;
   }
   if (videoShown() && player.canPlay) return player.play(state.speed);
@@ -141,14 +146,14 @@ function tick(now) {
   state.then = now;
   const frame = Math.floor(state.clock);
   if (frame !== state.frame) seekTo(frame);
-  if (state.frame >= data.to) end();
+  if (state.frame >= playedSpan()[1]) end();
   else requestAnimationFrame(tick);
 }
 
-// The replay at the head of a report starts again.
+// The replay at the head of a report starts again, and so does the stretch of a question.
 function end() {
   play(false);
-  if (data.opening) play(true);
+  if (data.opening || asking) play(true);
 }
 
 function step(count) {
@@ -192,6 +197,7 @@ function colourBy(by) {
 
 function onKey(event) {
   if (event.ctrlKey || event.metaKey || event.altKey || $("help").open) return;
+  if (asking) return onAskingKey(event);
   const inField = ["SELECT", "INPUT"].includes(event.target.tagName) && event.target.type !== "checkbox";
   const onButton = event.target.tagName === "BUTTON" || event.target.type === "checkbox";
   const one = event.shiftKey ? Math.max(Math.round(data.fps), 1) : 1;
@@ -203,6 +209,7 @@ function onKey(event) {
     n: () => toNext(events, 1), p: () => toNext(events, -1),
     x: () => toNext(data.errors, 1), z: () => toNext(data.errors, -1), "+": () => speed(1), "=": () => speed(1), "-": () => speed(-1),
     c: () => colourBy(options.by === "person" ? "group" : "person"), "?": () => $("help").showModal(),
+    ...(picked.ids.length ? { Escape: letGo } : {}),
   };
   for (const [name, , key, there] of TOGGLES) if (there) actions[key] = () => toggle(name);
   const action = actions[event.key.length === 1 ? event.key.toLowerCase() : event.key];
@@ -281,6 +288,7 @@ function layOut() {
   line = timeline($("timeline"), Math.max($("timeline").clientWidth, 320), jump);
   legend($("legend"));
   wholeGroupsKey($("groups-key"));
+  layOutPair();
   show();
 }
 
@@ -324,8 +332,11 @@ if (data.opening) zoom.times = FOLLOWED;
 if (player) $("under").append(player.video);
 buildHead();
 buildControls();
+buildQuestions();
+fillLists();
 layOut();
 listen();
+listenToPicks();
 seekToAddress();
 if (data.zoomed && hasPlan) {
   zoomTo(3);

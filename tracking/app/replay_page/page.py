@@ -21,10 +21,12 @@ from sim.store.tables import plain
 from sim.store.truth_files import spans
 from sim.types import Array, GroupEvent, Sequence, Tracks
 from tracking.app.replay_page.page_rows import SCALE, Json, PageRows, deltas, encode_rows, rows_of_tracks, rows_of_truth
+from tracking.app.replay_page.pair_columns import pair_columns
 from tracking.app.replay_page.video import PageVideo
 from tracking.drawing.plan_view import plan_area
 from tracking.errors.found import FoundError
-from tracking.running.run import grouped
+from tracking.grouping.belief import Belief
+from tracking.running.run import TrackingRun, grouped
 
 HERE = Path(__file__).parent
 EVER = 10**9  # after the last frame
@@ -33,8 +35,8 @@ SIDES = ("tracks", "other")  # names in the page's data of the first run, and of
 
 # The scripts of the page, in the order in which they run.
 SCRIPTS = (
-    "decode.js", "draw.js", "whole_groups.js", "plan.js", "camera_view.js", "image.js", "timeline.js", "video.js",
-    "page.js",
+    "decode.js", "pairs.js", "draw.js", "whole_groups.js", "plan.js", "camera_view.js", "image.js", "timeline.js",
+    "video.js", "pair_panel.js", "questions.js", "page.js",
 )  # fmt: skip
 
 
@@ -47,20 +49,27 @@ class Run:
     name: str = ""  # "": of the tracker
 
     @property
+    def info(self) -> Json:
+        """The content of run.json, as far as it is known."""
+        return dict(getattr(self.tracks, "info", {}))
+
+    @property
     def tracker(self) -> str:
         """The name that the page shows."""
-        return self.name or str(getattr(self.tracks, "info", {}).get("tracker", UNNAMED))
+        return self.name or str(self.info.get("tracker", UNNAMED))
 
 
 def write_page(
-    sequence: Sequence, runs: SequenceOf[Run], out: str | Path, video: PageVideo | None = None, start: int = 1
-) -> Path:
+    sequence: Sequence, runs: SequenceOf[Run], out: str | Path, video: PageVideo | None = None, start: int = 1,
+    belief: Belief | None = None,
+) -> Path:  # fmt: skip
     """Writes the replay page, one HTML file, and returns its path. The file is complete, or is not written at all.
 
-    runs: none, one, or two that are shown beside each other. start: the frame that is shown first, from 1.
+    runs: none, one, or two that are shown beside each other. start: the frame that is shown first, from 1. belief:
+    whose evidence about pairs of people is shown; None: the default.
     """
     shown = page_data(sequence, runs, start=start)
-    shown |= {"video": None if video is None else video.facts()}
+    shown |= {"video": None if video is None else video.facts(), "pairs": _pairs(sequence, runs, belief)}
     film = "" if video is None else video.content
     text = page_html(sequence.name, script_json(shown), film)
     path = Path(out)
@@ -143,6 +152,14 @@ def page_data(sequence: Sequence, runs: SequenceOf[Run], span: tuple[int, int] |
             if one.error.start <= high and one.error.end >= low
         ],
     }
+
+
+def _pairs(sequence: Sequence, runs: SequenceOf[Run], belief: Belief | None) -> Json:
+    """Returns the evidence about pairs of people by side, of those sides that have it."""
+    people: dict[str, TrackingRun | None] = {} if sequence.truth is None else {"truth": None}
+    people |= {side: TrackingRun(tuple(run.tracks), run.info) for side, run in zip(SIDES, runs, strict=False)}
+    found = {side: pair_columns(sequence, run, belief) for side, run in people.items()}
+    return {side: columns for side, columns in found.items() if columns is not None}
 
 
 def _length(sequence: Sequence, both: list[PageRows], detections: Json | None) -> int:

@@ -81,7 +81,8 @@ function planPane(ctx, width, height, shown, frame, options, taken) {
   if (options.trails) for (const side of people) drawTrails(plan, side, map);
   if (options.detections && found && found.plane !== "image") drawPlanDetections(plan);
   for (const side of people) drawPlanPeople(plan, side);
-  drawErrorsHere(plan, shown, Math.max(0.6 * scale, 11), (side, row) => [positionOf(plan, side, row)]);
+  drawPicked(plan, shown, (side, row) => bodyBox(plan, positionOf(plan, side, row)));
+  if (!asking) drawErrorsHere(plan, shown, Math.max(0.6 * scale, 11), (side, row) => [positionOf(plan, side, row)]);
   if (options.ids) drawPersonIds(plan, people.filter(side => side.rows(frame).length <= MANY));
   if (options.ids) for (const side of wholeGroups) drawWholeGroupIds(plan, side, map);
 }
@@ -180,9 +181,16 @@ function drawPlanPeople(plan, side) {
     const at = positionOf(plan, side, row);
     if (Number.isNaN(at[0])) continue;
     const colour = rowColour(side, row, plan.options.by);
+    addHit("plan", plan.ctx, side, row, bodyBox(plan, at));
     if (side.tracked) drawRing(plan, side, row, at, colour);
     else drawBody(plan, side, row, at, colour);
   }
+}
+
+// Left, top, right and bottom of a person, px.
+function bodyBox({ scale }, [u, v]) {
+  const r = Math.max(BODY.track * scale, 6);
+  return [u - r, v - r, u + r, v + r];
 }
 
 const LABEL_DIRECTIONS = [[1, 1], [1, -1], [-1, 1], [-1, -1], [0, 1], [1, 0], [-1, 0], [0, -1]];

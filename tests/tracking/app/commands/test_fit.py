@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,8 @@ import pytest
 from scenarios import load, sensor_settings
 from tests.refusals import answer, refused
 from tracking.app.cli import run
+from tracking.grouping.belief import Belief, default_belief
+from tracking.recordings.source import open_source
 
 
 @pytest.fixture(scope="module")
@@ -46,5 +49,57 @@ def test_a_belief_is_fitted_and_used(made: Path, capsys: pytest.CaptureFixture[s
     assert first["fitted"]["F1"] > 0.95
     assert first["fitted"]["pairs"] > 10
     answer(capsys, "track", "blob", made, "--detections", "truth", "--grouping", files[0], "--out", tmp_path / "t")
+    assert "--fps" in refused(capsys, *words[:-1], "--fps", "5", "--out", tmp_path / "x.toml")
     (run_file,) = (tmp_path / "t").rglob("run.json")
     assert json.loads(run_file.read_text())["grouping"]["grouping"] == "belief"
+
+
+def answers_by_truth(source: Path, folder: Path, kinds: tuple[str, ...] = ("not", "together")) -> Path:
+    """Answers to the questions of a page about a recording, as its labels have it, saved as the page does."""
+    page = folder / "page.html"
+    assert run(["view", str(source), "--out", str(page)]) == 0
+    data = json.loads(re.findall(r'id="data">(.*?)</script>', page.read_text(), re.DOTALL)[0])
+    (sequence,) = open_source(source)
+    columns = (getattr(sequence.truth, name).tolist() for name in ("frame", "id", "group"))
+    group = {(f, p): g for f, p, g in zip(*columns, strict=True)}
+    said = []
+    for q in data["pairs"]["truth"]["questions"]:
+        mates = group[q["first"], q["a"]] == group[q["first"], q["b"]] >= 0
+        span = {"from": (q["first"] - 1) / data["fps"], "to": (q["last"] - 1) / data["fps"]}
+        said.append({"a": q["a"], "b": q["b"], **span, "answer": kinds[mates]})
+    head = {"format": 1, "kind": "pair labels", "recording": data["name"], "frames": data["length"]}
+    file = folder / "answers.json"
+    file.write_text(json.dumps({**head, "people": data["pairs"]["truth"]["people"], "answers": said}))
+    return file
+
+
+def test_a_belief_is_adapted_by_answers(made: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (source,) = made.glob("*/street-*")
+    file, mine = answers_by_truth(source, tmp_path), tmp_path / "mine.toml"
+    found = answer(capsys, "fit", "grouping", "--labels", file, source, "--out", mine)["fitted"]
+    assert found["answers"] == len(json.loads(file.read_text())["answers"])
+    assert found["agreed"] >= found["agreed before"]
+    belief = Belief.from_toml(mine)
+    assert belief.threshold == found["threshold"]
+    assert belief.bias[0] == pytest.approx(default_belief().bias[0] + found["bias"], abs=1e-4)
+    assert run(["fit", "grouping", "--labels", str(file), "--labels", str(file), str(source), "--out", str(mine)]) == 0
+    assert "answers, the adapted one with" in capsys.readouterr().out
+    assert f"# flockscope fit grouping {source} --labels {file} --labels {file}" in mine.read_text()
+    answer(capsys, "group", source, "--grouping", mine, "--out", tmp_path / "run")
+    one = answers_by_truth(source, tmp_path, ("don't know", "together"))
+    assert run(["fit", "grouping", "--labels", str(one), str(source), "--out", str(mine)]) == 0
+    assert "all answers are of one kind" in capsys.readouterr().out
+
+
+def test_wrong_labels_are_refused(made: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (source,) = made.glob("*/street-*")
+    file, out = answers_by_truth(source, tmp_path), tmp_path / "mine.toml"
+    (tmp_path / "other.csv").write_text("frame,id,x,y\n" + "".join(f"{f},1,{f},2\n" for f in range(1, 9)))
+    line = ["fit", "grouping", "--labels", file, "--out", out]
+    assert "--events" in refused(capsys, *line, source, "--events", "cross")
+    shown = refused(capsys, *line, tmp_path / "other.csv", "--fps", "5")
+    assert f"{file}: people: got other people: of street-s30000" in shown
+    assert "those of other, 8 frames" in shown
+    assert f"{tmp_path / 'none.json'}" in refused(capsys, *line[:3], tmp_path / "none.json", source, "--out", out)
+    assert "street: got" in refused(capsys, *line, "street")
+    assert not out.exists()

@@ -14,10 +14,13 @@ import tracking.app.replay_page
 from sim.scene.camera import camera_rotation, project
 from sim.store.tables import plain
 from sim.store.truth_files import with_ground_height
-from sim.types import Camera, Scene, Sequence, Stairs
+from sim.types import Camera, Scene, Sequence, Stairs, Tracks
 from tests.groups_as_wholes import wholes
 from tracking.app.replay_page.page import Run, page_data
+from tracking.app.replay_page.pair_columns import pair_columns
 from tracking.drawing.layers import SIGMA_99, ellipse
+from tracking.grouping.belief import default_belief
+from tracking.running.explained_people import explained_people
 
 NODE = shutil.which("node")
 HERE = Path(tracking.app.replay_page.__file__).parent
@@ -118,3 +121,38 @@ def test_errors_are_named_for_a_second_the_latest_two() -> None:
     data = EMPTY | {"fps": 10, "errors": [*errors, {"side": "other", "kind": "e", "start": 1, "end": 99}]}
     what = "[9, 20, 21, 33, 41, 42, 51].map(f => errorsAt({ name: 'tracks' }, f).map(error => error.kind).join(''))"
     assert ran(data, ("decode.js", "draw.js"), what) == ["a", "cb", "ca", "da", "d", "", ""]
+
+
+# Of a pair in each of some frames: its probability, whether it is in one group, and the sum and the words of what
+# decides; stretches of frames that count as one; the most probable partner.
+PAIR = """[10, 60, 100, 130].map(frame => {
+    const pairs = pairsOf.truth, stints = stintsOf(pairs, [5, 4]), row = pairRowAt(pairs, stints, frame);
+    const { named, rest } = reasonsOf(pairs, stints, row);
+    return [pairs.probability[row], inOneGroup(truth, [4, 5], frame), inOneGroupOf(tracks, truth, [4, 5], frame),
+        pairs.bias + named.reduce((sum, [value]) => sum + value, rest), named.map(([, words]) => words)];
+}).concat([[stretchesOf(1, 9, frame => frame !== 4 && frame < 8), partnersOf(pairsOf.truth, 4)[0][0],
+    stintsOf(pairsOf.truth, [4, 99]), pairRowAt(pairsOf.truth, stintsOf(pairsOf.truth, [4, 5]), 9999)]])"""
+
+
+def test_evidence_about_two_people(sequence: Sequence, tracks: list[Tracks]) -> None:
+    """It adds up to the probability, and says what is so."""
+    found = explained_people(sequence, None, default_belief())
+    data = page_data(sequence, [Run(tracks)]) | {"pairs": {"truth": pair_columns(sequence, None)}}
+    *rows, last = ran(data, ("decode.js", "pairs.js"), PAIR)
+    for frame, (probability, truly, tracked, total, words) in zip((10, 60, 100, 130), rows, strict=True):
+        (row,) = np.flatnonzero((found.a == 4) & (found.b == 5) & (found.step == (frame - 1) // found.size))
+        assert probability == pytest.approx(found.probability[row], abs=0.003)
+        assert total == pytest.approx(found.log_odds[row], abs=0.5)
+        assert truly
+        assert tracked
+        assert f"{found.values[row, 0]:.1f} m apart" in words
+    assert last == [[[1, 3], [5, 7]], 5, [], -1]
+
+
+def test_words_about_two_people() -> None:
+    what = "[...[0.34, -0.34, 0, NaN].map(growthWords), ...[0.3, 0].map(oneWalksWords)]"
+    assert ran(EMPTY, ("decode.js", "pairs.js"), what) == [
+        "moving apart by 0.3 m/s", "coming nearer by 0.3 m/s", "their distance hardly changes",
+        "their distance hardly changes", "one stands and the other walks, 30 % of the time",
+        "both walk, or both stand",
+    ]  # fmt: skip
