@@ -68,7 +68,7 @@ def noises(pos, time, seen):
                 off *= min(1.0, 4.0 / max(np.hypot(*off), 1e-9))
                 span = (now - t2) / 2
                 r = math.exp(-span)
-                new = (np.outer(off, off) - np.eye(2) * (0.5 * span**2) ** 2) / (6 - 8 * r + 2 * r**2)
+                new = (np.outer(off, off) - np.eye(2) * (0.18 * span) ** 2) / (6 - 8 * r + 2 * r**2)
                 fade = math.exp(-span / 20)
                 own[p] = own[p][0] * fade + new, own[p][1] * fade + 1
                 all_sum, all_count = all_sum + new, all_count + 1

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from benchmarks.support.chart import Panel, lines
 from benchmarks.support.tables import head, number, row
-from tracking.fitting.belief import sample_of
+from tracking.fitting.belief import sample_of, shifts_of_sample
 from tracking.fitting.belief_scores import BINS, belief_scores, reliability
 from tracking.fitting.grouping_scenes import pair_scenes
 from tracking.grouping.belief import Belief
@@ -21,7 +21,8 @@ def calibration(names: Sequence[str], seeds: range, belief: Belief, out: Path | 
     panels = []
     for name in names:
         sample = sample_of(list(pair_scenes([name], seeds)))
-        log_odds = belief.log_odds(sample.values)[:, 0]
+        log_odds = belief.log_odds(sample.values, sample.noise)[:, 0]
+        log_odds += shifts_of_sample(sample, log_odds, belief.share)
         scores, bins = belief_scores(sample, log_odds), reliability(log_odds, sample.together, sample.weight)
         words = [f"{key} {value:.0f}" if key == "pairs" else f"{key} {value:.3f}" for key, value in scores.items()]
         print(f"\n{Path(name).stem}: {', '.join(words)}")

@@ -109,7 +109,6 @@ class Belief:
 
         return table_sums(values, noise, self.noise, self.bias, *_joined(self))
 
-
     def together(self, log_odds: Array, noise: Array) -> Array:
         """Returns by how much the probability of log-odds (R,) of now exceeds the threshold at noise (R,), m."""
         return np.asarray(1 / (1 + np.exp(-log_odds)) - np.interp(noise, self.noise, self.threshold))

@@ -29,7 +29,7 @@ class MateShare:
         self.latest, self.counts, self.shift = np.zeros(0, np.int64), np.zeros(BINS), np.zeros(1)
 
     def add(self, step: Ints, pair: Ints, log_odds: Array) -> Array:
-        """Adds beliefs (R,), steps ascending, of pairs (R,), numbers from 0, and returns the shift (R,) at each step."""
+        """Adds beliefs (R,), steps ascending, of pairs (R,), numbers from 0. Returns the shift (R,) at each step."""
         from tracking.grouping.belief_kernels import shifts_of_share
 
         more, out = int(pair.max(initial=-1)) + 1 - len(self.latest), np.empty(len(step))

@@ -15,11 +15,11 @@ def add_to_motion(
 ) -> None:  # fmt: skip
     """Adds rows (R,), steps ascending, to the state of their people, and writes velocities and noise after each step.
 
-    chord: steps over which `vel` is measured. times (T,): of the regressions, s. settings (5,): longest unlike leg
-    motion, m/s², correlation time of errors, s, time for which a person's own noise counts, s, weight of the noise of
-    all, and longest jump, m. State by person: recent (K, W, 4), step, time, x, y of the last W rows; sums (K, T, 7);
-    spread (K, 4), weighted sums of the noise xx, xy, yy, m², and its weight. pooled (4,): these sums of all people. Out:
-    vel (R, 2), slope (R, T, 2), m/s, nan if unknown; noise (R, 3), m²: xx, xy, yy.
+    chord: steps over which `vel` is measured. times (T,): of the regressions, s. settings (5,): change of a
+    walker's velocity, m/s, correlation time of errors, s, time for which a person's own noise counts, s, weight of the
+    noise of all, and longest jump, m. State by person: recent (K, W, 4), step, time, x, y of the last W rows; sums
+    (K, T, 7); spread (K, 4), weighted sums of the noise xx, xy, yy, m², and its weight. pooled (4,): these sums of all
+    people. Out: vel (R, 2), slope (R, T, 2), m/s, nan if unknown; noise (R, 3), m²: xx, xy, yy.
     """
     legs, correlation, own, common, jump = settings
     low = 0
@@ -55,7 +55,7 @@ def _add_noise(
     if recent[0, 0] != step - 1 or recent[1, 0] != step - 2:
         return
     # of errors with the standard deviation s and the correlation r from step to step, the deviation has the variance
-    # s² (6 - 8 r + 2 r²); legs add (a t²)² for an acceleration a
+    # s² (6 - 8 r + 2 r²); legs add (v t)² for a change of velocity v
     lasted, before = time - recent[0, 1], recent[0, 1] - recent[1, 1]
     t = (lasted + before) / 2
     x = pos[0] - recent[0, 2] - (recent[0, 2] - recent[1, 2]) * lasted / before
@@ -63,7 +63,7 @@ def _add_noise(
     far = np.sqrt(x * x + y * y)
     if far > jump:
         x, y = x * jump / far, y * jump / far
-    r, walked = np.exp(-t / correlation), (legs * t * t) ** 2
+    r, walked = np.exp(-t / correlation), (legs * t) ** 2
     share = 1 / (6 - 8 * r + 2 * r * r)
     spread *= np.exp(-t / own)
     for part in (spread, pooled):
@@ -132,7 +132,7 @@ def file_ends(
     begin: Ints, neighbour: Ints, pos: Array, way: Array, i: Ints, j: Ints, slowest: float, reach: float,
     straight: float, along: float, out: Array,
 ) -> None:  # fmt: skip
-    """Writes for pairs (R,) of rows at how many ends, 0 to 2, somebody goes on the line through the two along their way.
+    """Writes for pairs (R,) of rows at how many ends, 0 to 2, somebody goes on in the line of the two along their way.
 
     begin (N + 1,), neighbour: who is near each row of pos, way (N, 2), m, m/s. slowest: m/s. Whoever goes on is less
     than reach from the end, m, in a direction whose cosine with the line is at least `straight`. along: least cosine of

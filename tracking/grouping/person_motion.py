@@ -17,9 +17,10 @@ from sim.types import Array, Ints
 STEP = 0.4  # s: longest step, unless one frame lasts longer.
 CHORD = 0.8  # s over which velocities are measured: two frames of a recording with 2.5 frames/s.
 TIMES = (1.5, 4.0)  # s: in regressions, positions have weights exp(-age / time).
-# Of the noise: what an unlike step adds, m/s²; correlation time of the errors, s; time and number of deviations for
-# which a person's own noise is told from that of all, s; the longest deviation that counts, m.
-LEGS, CORRELATION, OWN, COMMON, JUMP = 0.5, 1.0, 20.0, 20.0, 4.0
+# Of the noise: standard deviation of a walker's change of velocity, m/s (0.12 to 0.2 in seq_hotel and zara01, over 0.4
+# to 2 s); correlation time of the errors, s; time and number of deviations for which a person's own noise is told from
+# that of all, s; the longest deviation that counts, m.
+LEGS, CORRELATION, OWN, COMMON, JUMP = 0.18, 1.0, 20.0, 20.0, 4.0
 FIRST = (0.1, 10.0)  # m: noise before anything was seen, with the weight of so many deviations.
 
 

@@ -2,8 +2,9 @@
 
 import numpy as np
 
-from tracking.fitting.belief import PairSample, best_threshold, sample_of
+from tracking.fitting.belief import LEVELS, PairSample, best_thresholds, fit_belief, sample_of
 from tracking.fitting.grouping_scenes import pair_scenes
+from tracking.grouping.pair_evidence import NAMES
 
 
 def test_what_is_named_twice_comes_once_and_weighs_twice():
@@ -27,8 +28,26 @@ def test_the_threshold_is_best_for_the_mean_of_scenes():
 
     def found(weight):
         rows = np.array(weight)[scene] / np.bincount(scene)[scene]
-        threshold = best_threshold(PairSample(np.zeros((len(scene), 0)), together, rows, scene, 9), log_odds)
+        none, nobody = np.zeros((len(scene), 0)), np.zeros_like(scene)
+        sample = PairSample(none, np.full(len(scene), LEVELS[2]), together, rows, nobody, nobody, scene, 9)
+        threshold = best_thresholds(sample, log_odds)[2]
         return np.log(threshold / (1 - threshold))
 
     assert 1 <= found([0.2, 0.4, 0.4]) < 3
     assert -3 <= found([0.8, 0.1, 0.1]) < -1
+
+
+def test_thresholds_and_tables_depend_on_the_noise():
+    """Where positions err the same distance tells less, and a pair counts as together from a lower probability on."""
+    r, rows = np.random.default_rng(0), 6000
+    noise, together = np.repeat([0.0, 1.5], rows // 2), r.random(rows) < 0.3
+    x = np.where(together, 0.8, 2.0) + r.normal(0, np.where(noise > 0, 1.5, 0.3), rows)
+    values = np.full((rows, len(NAMES)), np.nan)
+    values[:, 0] = x
+    number = np.arange(rows)
+    sample = PairSample(values, noise, together, np.full(rows, 1 / rows), number, number, 0 * number, rows)
+    found = fit_belief(sample)
+    (table,) = found.tables
+    steep = np.ptp(table.log_odds[0], axis=1)
+    assert steep[0] > 2 * steep[-1]
+    assert found.threshold[0] > found.threshold[-1]
