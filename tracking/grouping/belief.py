@@ -37,7 +37,7 @@ FROZEN = Path(__file__).with_name("belief.toml")  # The default belief.
 KIND = "belief"
 UNSEEN = -4.0  # Belief about two people who are too far apart for a row: log-odds.
 DECISIONS = NOW, EVENTS = ("now", "events")  # Columns of a table.
-NUMBERS = ("share", "stay", "come", "memory")  # Numbers of `Belief` in its file.
+NUMBERS = ("share", "hold", "join", "stay", "come", "memory")  # Numbers of `Belief` in its file.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,8 +58,10 @@ class Belief:
     bias: Array  # (2, L): log-odds added to the tables, for `DECISIONS`, by levels of noise
     threshold: Array  # (L,): probability above which two people are together now, by levels of noise
     share: float = 0.1  # of mates among the pairs of the fit, where none is known (`mate_share`)
-    # stay, come: log-odds added for pairs that were in one group a step before, and taken from all others: groups
-    # of events change the later the greater they are
+    # hold, join: probability added for pairs that were in one group a step before, and taken from all others: the
+    # greater they are, the longer the groups of now last; stay, come: the same in log-odds, for the groups of events
+    hold: float = 0.25
+    join: float = 0.1
     stay: float = 7.0
     come: float = 1.2
     memory: float = 1.0  # (s): a missed member stays so long in the group

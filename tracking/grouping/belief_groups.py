@@ -2,7 +2,7 @@
 
 The two groups (or people) with the highest mean over their pairs are joined, as long as it is above 0. So a chain of
 strangers is no group, and a group whose ends are far apart is one. Groups of *now* take a pair's probability minus the
-belief's threshold, groups of *events* its log-odds with a memory of the step before.
+belief's threshold, groups of *events* its log-odds; both with a memory of the step before.
 """
 
 from __future__ import annotations
@@ -100,7 +100,9 @@ def belief_groups(
     row, step, log_odds = row[order], step[order], log_odds[order]
     pairs = (step, found.a[row], found.b[row])
     gain = belief.together(found.log_odds[row, 0], found.noise[row])
-    now = groups_of_steps(shape, *pairs, gain, float(belief.together(np.array(UNSEEN), np.array(0.0))))
+    now = groups_of_steps(
+        shape, *pairs, gain, float(belief.together(np.array(UNSEEN), np.array(0.0))), belief.hold, belief.join
+    )
     lasting = groups_of_steps(shape, *pairs, log_odds, UNSEEN, belief.stay, belief.come)
     return FoundGroups(_links(lasting, size, found), now, size)
 

@@ -1,8 +1,8 @@
 """Why two people are taken as together: the belief of each pair and step, divided into its quantities.
 
-The log-odds of *now* are a bias, the sum of all tables, and what the share of mates seen so far adds (`SHARE`). `explain`
-sums the tables of each quantity over the times of its means, as these tables are fitted together and only their sum has
-a meaning.
+The log-odds of *now* are a bias, the sum of all tables, and what the share of mates seen so far adds (`SHARE`).
+`explain` sums the tables of each quantity over the times of its means, as these tables are fitted together and only
+their sum has a meaning.
 """
 
 from __future__ import annotations
