@@ -220,7 +220,7 @@ class PairMeans:
         times, near = self.times / self.seconds, np.empty(count, np.int64)
         means, in_noise = np.empty((count, len(QUANTITIES), many)), np.empty((count, len(IN_NOISE)))
         vectors = np.concatenate([np.empty((count, many, 2)), moment.change], axis=1)
-        add_to_offsets(step, pair, moment.offset, times, self.offsets, self.last, vectors[:, :many])
+        add_to_offsets(step, pair, moment.offset, times, self.offsets, self.last.copy(), vectors[:, :many])
         add_to_means(step, pair, moment.quantities, times, self.total, self.weight, self.last, self.rows, means, near)
         usual = np.repeat(MATES, [many, len(person_motion.TIMES)])
         lengths_in_noise(vectors, usual, NOISE_SHARES, moment.noise, in_noise)
