@@ -7,6 +7,7 @@ import pytest
 
 from scenarios.errors import InputError
 from tests import reference_belief as slow
+from tracking.grouping import pair_evidence
 from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs
 from tracking.grouping.pair_evidence import NAMES, evidence
 from tracking.grouping.person_motion import StepRows
@@ -46,7 +47,8 @@ def times(pos, seconds):
 
 @pytest.mark.parametrize("seed", [0, 1, 2, "square"])
 @pytest.mark.parametrize("seconds", [0.3, 0.4])
-def test_evidence_equals_the_slow_twin(seed, seconds):
+def test_evidence_equals_the_slow_twin(seed, seconds, monkeypatch):
+    monkeypatch.setattr(pair_evidence, "PORTION", 50)
     square = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]])  # all have two others equally near
     pos = np.tile(square, (3, 1, 1)) if seed == "square" else places(seed)
     time = times(pos, seconds)
@@ -87,7 +89,10 @@ BAD_FILES = [
     ("stay", "wait", "wait"),
     ('name = "sideways, 5 s"', 'name = "sideways, 3 s"', "table 8: name"),
     ("now = [", "now = [1, ", "table 1: now"),
-    ("at = [", "at = [9, ", "table 1: now"),
+    ("at = [", "at = [9, ", "table 1: at"),
+    ("at = [", "at = [-1, ", "table 1: now"),
+    ("threshold = [", "threshold = [0.5, ", "threshold"),
+    ("noise = [", "noise = [-1, ", "bias"),
     ("at = [", "at = [[1], [2, 3], ", "table 1: at"),
     ("events = [", 'events = ["x", ', "table 1: events"),
     ("events = [", "change = [", "table 1"),

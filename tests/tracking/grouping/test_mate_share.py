@@ -22,7 +22,7 @@ def test_the_share_of_another_place_is_found(share):
     shifts = MateShare(0.1).add(np.arange(4000) // 20, np.arange(4000), log_odds)
     right = np.log(mates.sum() / (~mates).sum()) - np.log(0.1 / 0.9)
     assert shifts[-1] == pytest.approx(right, abs=0.25)
-    assert abs(shifts[0]) < 0.5 * abs(right) + 0.1, "few pairs shift little"
+    assert abs(shifts[0]) < 0.5 * abs(right) + 0.3, "few pairs shift little"
 
 
 def test_a_pair_counts_once_by_its_latest_belief():
