@@ -60,7 +60,7 @@ class Belief:
     share: float = 0.1  # of mates among the pairs of the fit, where none is known (`mate_share`)
     # hold, join: probability added for pairs that were in one group a step before, and taken from all others: the
     # greater they are, the longer the groups of now last; stay, come: the same in log-odds, for the groups of events
-    hold: float = 0.25
+    hold: float = 0.3
     join: float = 0.1
     stay: float = 7.0
     come: float = 1.2

@@ -31,9 +31,11 @@ from sim.truth.merge_split_rules import frames_of
 from sim.truth.queue_detection import ADVANCE_TIME, BRIDGE_TIME, queues
 from sim.truth.velocities import chords
 from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Tracks
+from tracking.grouping.belief import Belief
 from tracking.grouping.group_events import TrackedMotion, events_of_labels
 from tracking.grouping.group_labels import label_people
 from tracking.grouping.grouping_choice import Grouping, default_grouping, find_groups
+from tracking.grouping.person_motion import steady_places
 from tracking.grouping.tracks_table import TracksTable, tabulate
 
 # Kinds of events in which the membership of groups changes.
@@ -129,9 +131,11 @@ def labels_and_events(
         # groups that appear later would change frames that are reported already
         tracks = [t.replace(group=np.full(len(t.id), -1), groups=None) if _has_groups(t) else t for t in tracks]
     table, events = tabulate(tracks, fps, px_per_m, places), list[GroupEvent]()
+    steady = _steady(table, fps) if isinstance(rule, Belief) else table
     if not named or own.get("merge", math.inf) > 1:
-        table, events = _grouped(table, named, fps, rule)
-    events += [] if objective else _crossings_and_queues(table, fps)
+        group, events = _grouped(table, steady, named, fps, rule)
+        table, steady = replace(table, group=group), replace(steady, group=group)
+    events += [] if objective else _crossings_and_queues(steady, fps)
     events = [e for e in events if (e.emitted or e.start) < own.get(e.kind, math.inf)]
     return table, *_of_frames(tracks, table, events)
 
@@ -146,22 +150,35 @@ def _own_events(tracks: Sequence[Tracks]) -> dict[str, int]:
     return {**found, **(dict.fromkeys(MEMBERSHIP_KINDS, min(membership)) if membership else {})}
 
 
-def _grouped(table: TracksTable, named: bool, fps: float, rule: Grouping) -> tuple[TracksTable, list[GroupEvent]]:
-    """Returns the table with group ids filled in, and the membership events."""
+def _steady(table: TracksTable, fps: float) -> TracksTable:
+    """Returns the table with the places and velocities that are most likely where positions err (`steady_places`): only
+    so does a person who stands still not come and go."""
+    rows = table.seen if table.seen is not None else np.ones(len(table.frame), bool)
+    pos = table.pos.copy()
+    pos[rows] = steady_places(table.frame[rows], table.column[rows], table.pos[rows], table.length, fps)
+    moved = (pos != table.pos).any(axis=1)
+    vel = np.where(moved[:, None], chords(table.frame, table.id, pos, fps), table.vel)
+    return replace(table, pos=pos, vel=vel)
+
+
+def _grouped(
+    table: TracksTable, steady: TracksTable, named: bool, fps: float, rule: Grouping
+) -> tuple[Ints, list[GroupEvent]]:
+    """Returns the group ids of the table's rows, and the membership events by the motion of steady places."""
     if named and (table.group < 0).all():
-        return table, []
+        return table.group, []
     found = find_groups(table, fps, rule)
-    motion = TrackedMotion(table.motion(), fps, table.measured_motion())
+    motion = TrackedMotion(steady.motion(), fps, steady.measured_motion())
     group, events = label_people(table.frame, table.column, motion, found, rule)
     if not named:
-        return replace(table, group=group), events
+        return group, events
     # As long as a tracker's groups equal those of the grouping, the grouping's events are used: their onsets are dated
     # back.
     other = table.frame[group != table.group]
     equal = int(other[0]) if len(other) else table.length
     changes = events_of_labels(motion.rows) if len(other) else []
     early = [e for e in events if (e.emitted or e.start) <= equal]
-    return table, early + [e for e in changes if (e.emitted or e.start) > equal]
+    return table.group, early + [e for e in changes if (e.emitted or e.start) > equal]
 
 
 def _crossings_and_queues(table: TracksTable, fps: float) -> list[GroupEvent]:

@@ -7,6 +7,8 @@ import numpy as np
 from sim.compiler import njit
 from sim.types import Array, Ints
 
+FASTEST = 1.5  # m/s: standard deviation of the velocity of whoever was not seen before
+
 
 @njit(cache=True)
 def add_to_motion(
@@ -157,3 +159,40 @@ def file_ends(
                 if k != a and k != b and away < reach and sign * (p * x + q * y) >= straight * away * far:
                     out[r] += 1.0
                     break
+
+
+@njit(cache=True)
+def filter_places(person: Ints, time: Array, pos: Array, errors: Array, spread: float) -> Array:
+    """Returns the places (R, 2) of a Kalman filter for each axis by itself, rows sorted by person, then time.
+
+    errors (R, 2): variances of pos, m². spread: by how much a velocity changes in 1 s, m/s. A row without position
+    keeps it unknown.
+    """
+    out, state, cov = pos.copy(), np.zeros((2, 2)), np.zeros((2, 3))
+    last = -1
+    for r in range(len(person)):
+        if np.isnan(pos[r, 0]):
+            continue
+        if last < 0 or person[last] != person[r]:
+            for d in range(2):
+                state[d, 0], state[d, 1] = pos[r, d], 0.0
+                cov[d, 0], cov[d, 1], cov[d, 2] = errors[r, d], 0.0, FASTEST * FASTEST
+        else:
+            t = time[r] - time[last]
+            for d in range(2):
+                q = spread * spread * t
+                state[d, 0] += t * state[d, 1]
+                cov[d, 0] += t * (2 * cov[d, 1] + t * cov[d, 2]) + q * t * t / 3
+                cov[d, 1] += t * cov[d, 2] + q * t / 2
+                cov[d, 2] += q
+                whole = cov[d, 0] + errors[r, d]
+                if whole > 0:
+                    gain, drift, off = cov[d, 0] / whole, cov[d, 1] / whole, pos[r, d] - state[d, 0]
+                    state[d, 0] += gain * off
+                    state[d, 1] += drift * off
+                    cov[d, 2] -= drift * cov[d, 1]
+                    cov[d, 1] -= gain * cov[d, 1]
+                    cov[d, 0] -= gain * cov[d, 0]
+        out[r, 0], out[r, 1] = state[0, 0], state[1, 0]
+        last = r
+    return out

@@ -21,6 +21,7 @@ TIMES = (1.5, 4.0)  # s: in regressions, positions have weights exp(-age / time)
 # to 2 s); correlation time of the errors, s; time and number of deviations for which a person's own noise is told from
 # that of all, s; the longest deviation that counts, m.
 LEGS, CORRELATION, OWN, COMMON, JUMP = 0.18, 1.0, 20.0, 20.0, 4.0
+STEADY = 0.3  # m/s: by how much a walker's velocity changes in 1 s
 FIRST = (0.1, 10.0)  # m: noise before anything was seen, with the weight of so many deviations.
 
 
@@ -104,3 +105,28 @@ class PersonMotion:
             taken = np.full((len(rows), *table.shape[1:]), empty)
             taken[~new] = table[rows[~new]]
             setattr(self, name, taken)
+
+
+def steady_places(frame: Ints, column: Ints, pos: Array, length: int, fps: float) -> Array:
+    """Returns where people are by a Kalman filter with their own noise, (R, 2), m: the same places if these are exact.
+
+    frame, column (R,), from 0, pos (R, 2), m: one row per person and frame, sorted by frame. People walk at nearly
+    constant velocity. Errors that are correlated over a time count as many times as often as they are alike.
+    """
+    from tracking.grouping.motion_kernels import filter_places
+
+    size = frames_per_step(fps)
+    seen, people = step_rows(frame, column, pos, length, fps), int(column.max(initial=0)) + 1
+    motion = PersonMotion(people, size / fps)
+    variance = np.maximum(motion.add(seen.step, seen.column, seen.pos, seen.time).noise[:, [0, 2]], 0.0)
+    # of the last step that is over when the frame comes
+    key, wanted = seen.column * (length + 1) + seen.step, column * (length + 1) + (frame - 1) // size
+    row = np.searchsorted(key[np.lexsort((seen.step, seen.column))], wanted, side="right") - 1
+    order = np.lexsort((seen.step, seen.column))
+    known = (row >= 0) & (seen.column[order][row] == column)
+    sd, _ = FIRST
+    stay = np.exp(-1 / (fps * CORRELATION))
+    errors = np.where(known[:, None], variance[order][row], sd * sd) * (1 + stay) / (1 - stay)
+    out, order = np.empty_like(pos), np.lexsort((frame, column))
+    out[order] = filter_places(column[order], frame[order] / fps, pos[order], errors[order], STEADY)
+    return out
