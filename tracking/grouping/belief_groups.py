@@ -14,8 +14,9 @@ import numpy as np
 from sim.truth.merge_split_rules import frames_of, runs, stretches
 from sim.types import Array, Bools, Ints
 from tracking.grouping.belief import UNSEEN, Belief, PairBeliefs, pair_beliefs
+from tracking.grouping.group_events import SEARCHED
 from tracking.grouping.link_rule import CELLS, Links
-from tracking.grouping.person_motion import frames_per_step, step_rows
+from tracking.grouping.person_motion import StepRows, frames_per_step, step_rows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -104,12 +105,13 @@ def belief_groups(
         shape, *pairs, gain, float(belief.together(np.array(UNSEEN), np.array(0.0))), belief.hold, belief.join
     )
     lasting = groups_of_steps(shape, *pairs, log_odds, UNSEEN, belief.stay, belief.come)
-    return FoundGroups(_links(lasting, size, found), now, size)
+    return FoundGroups(_links(lasting, size, found, seen, frames_of(SEARCHED * fps / size, 1.0)), now, size)
 
 
-def _links(label: StepGroups, size: int, found: PairBeliefs) -> Links:
+def _links(label: StepGroups, size: int, found: PairBeliefs, seen: StepRows, searched: int) -> Links:
     """Returns all switches of links: any two people of one group are linked. A removal is sure if the pair's log-odds,
-    summed over the time of the link, are positive."""
+    summed over the time of the link, are positive; a link if they were negative before, summed over as many steps as
+    are searched, or the two were too far apart for evidence."""
     steps, people = label.shape
     group = label.step * people + label.group
     order = np.argsort(group, kind="stable")
@@ -122,11 +124,16 @@ def _links(label: StepGroups, size: int, found: PairBeliefs) -> Links:
     row = (found.a * people + found.b) * steps + found.step
     order = np.argsort(row)
     total, row = np.append(0.0, np.cumsum(found.log_odds[order, 1])), row[order]
-    begin, end = (np.searchsorted(row, both * steps + at) for at in (first, last + 1))
+    since = np.maximum(first - searched, 0)
+    before, begin, end = (np.searchsorted(row, both * steps + at) for at in (since, first, last + 1))
+    where = np.sort(seen.column * steps + seen.step)
+    k, at = runs(since, first)
+    there = np.isin(both[k] // people * steps + at, where) & np.isin(both[k] % people * steps + at, where)
+    met = np.bincount(k, there, len(both)) > begin - before  # also where they had no row
     ends = last + 1 < steps
     t, both = np.concatenate([first, last[ends] + 1]), np.concatenate([both, both[ends]])
     on = np.arange(len(t)) < len(first)
-    sure = np.append(on[: len(first)], (total[end] > total[begin])[ends])
+    sure = np.append(met | (total[begin] < total[before]), (total[end] > total[begin])[ends])
     order = np.lexsort((both, t))
     t, both = t[order], both[order]
     return Links(t * size, both // people, both % people, on[order], sure[order])

@@ -80,13 +80,13 @@ class Parts:
 
 
 def event_of_change(
-    change: GroupChange, t: int, parts: Parts, motion: TrackedMotion, *, late: bool = False
+    change: GroupChange, t: int, parts: Parts, motion: TrackedMotion, *, late: bool = False, met: bool = True
 ) -> GroupEvent | None:
     """Returns the event of a change that became known in frame t.
 
     It is None for a merge or split that was not seen (`TrackedMotion.onset`), and for an enter in the first second.
     late: True if groups are known later than their people, so that people alone who form one and were never apart
-    enter.
+    enter. met: False if people who come together were never apart by all evidence.
     """
     # a group leaves when its last two people were measured, or its last one: it may be predicted for longer
     if change.kind == "leave":
@@ -96,7 +96,8 @@ def event_of_change(
         joins = change.kind not in ("split", "dissolve")
         # whoever held a group together may be gone
         pairs = list(combinations(parts.sets, 2))
-        onsets = [motion.onset(a, b | parts.gone, t, joins=joins) for a, b in pairs]
+        seen = met or not joins
+        onsets = [motion.onset(a, b | parts.gone, t, joins=joins) if seen else None for a, b in pairs]
         unchanged = [pair for pair, onset in zip(pairs, onsets, strict=True) if onset is None]
         if len(set(connected(parts.sets, unchanged))) > 1:
             start = min(onset for onset in onsets if onset is not None)
@@ -118,6 +119,13 @@ def corrects(change: GroupChange, parted: Mapping[PersonSet, bool]) -> bool:
     them."""
     sure = [together for pair, together in parted.items() if pair <= {*change.members}]
     return change.kind in ("split", "dissolve") and bool(sure) and not any(sure)
+
+
+def were_apart(change: GroupChange, joined: Mapping[PersonSet, bool]) -> bool:
+    """Returns False if people come into one group who were, by all evidence, never apart. joined: pairs that are in one
+    group from now on, True if the evidence before, summed over some time, speaks against them."""
+    sure = [apart for pair, apart in joined.items() if pair <= {*change.members}]
+    return not sure or any(sure)
 
 
 def events_of_labels(motion: MotionRows) -> list[GroupEvent]:

@@ -21,7 +21,7 @@ from sim.truth.motion_rows import frames_of_change
 from sim.types import GroupEvent, Ints
 from tracking.grouping.belief import Belief
 from tracking.grouping.belief_groups import FoundGroups
-from tracking.grouping.group_events import Parts, TrackedMotion, corrects, event_of_change
+from tracking.grouping.group_events import Parts, TrackedMotion, corrects, event_of_change, were_apart
 from tracking.grouping.link_rule import LinkRule
 
 
@@ -94,9 +94,12 @@ def label_people(
         group[lasting] = group_of[column[lasting]]
         for people in shown.values():
             group_of[list(people)] = -1
-        parted = {frozenset((a, b)): sure for a, b, on, sure in switched if not on}
+        joined, parted = ({frozenset((a, b)): sure for a, b, x, sure in switched if x == on} for on in (True, False))
         real = [c for c in changes if not corrects(c, parted)]
-        told = (event_of_change(c, t, parts_of_change(c, old, state), motion, late=True) for c in real)
+        told = (
+            event_of_change(c, t, parts_of_change(c, old, state), motion, late=True, met=were_apart(c, joined))
+            for c in real
+        )
         events += [e for e in told if e is not None]
     return _without_singles(frame, group), events
 
