@@ -97,6 +97,13 @@ def at_most(truth: Truth, tracks: Sequence[Tracks]) -> float:
     return 2 * seen / (true + seen) if true else float("nan")
 
 
+def truly_grouped(truth: Truth, tracks: Sequence[Tracks]) -> list[Tracks]:
+    """Returns tracks of people with known ids in their true groups."""
+    size = int(truth.id.max(initial=0)) + 1
+    key = truth.frame * size + truth.id
+    return [t.replace(group=truth.group[np.searchsorted(key, t.index * size + t.id)]) for t in tracks]
+
+
 def _pairs(key: Ints) -> int:
     """Returns the number of pairs of rows with the same key."""
     count = np.unique(key, return_counts=True)[1]

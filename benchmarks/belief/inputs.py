@@ -10,9 +10,9 @@ pixels    pictures, tracked by `blob`
 trackers  what the scenario's own sensor reports, by tracker; groups are the tracker's own where it names them
 
 Columns: pairwise F1, group F1 and event F1, means over sequences with 95 % intervals; at most: pairwise F1 of the true
-groups of the people who are detected, where that is known; merges that are right, wrong and
-missed in all; median life of groups, s: a stretch is a time in which exactly the same two or more people are one group
-(who is missed for 1 s or less counts as before), then the share of stretches below 1 s, each with the truth's.
+groups of the people who are detected, where that is known; merges that are right, wrong and missed in all; median life
+of groups, s (`benchmarks.belief.lives`), then the share of stretches below 1 s, each with the truth's, which are those
+of the people who are detected where that is known.
 --before: the same of another belief, and the paired difference; or the paired difference from the scores that --json
 has stored, as of other code.
 """
@@ -28,7 +28,7 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.belief.cameras import VIEWS, at_most, at_true_places, known_boxes, seen_by
+from benchmarks.belief.cameras import VIEWS, at_most, at_true_places, known_boxes, seen_by, truly_grouped
 from benchmarks.belief.lives import lives_of_tracks, lives_of_truth
 from benchmarks.support.options import seeds_text
 from benchmarks.support.tables import difference_cell, mean_cell, number, table
@@ -64,6 +64,7 @@ class Input:
     grouped: Grouped  # returns its tracks with the groups of a belief
     apart: bool = True  # another belief may find other groups
     most: float = float("nan")  # pairwise F1 of the true groups of the people who are detected, if that is known
+    seen: Sequence[Tracks] | None = None  # the true groups of these people, if that is known
 
 
 def _tracked(tracker: str, sequence: LabelledSequence, mode: DetectionMode, seed: int) -> Grouped:
@@ -100,7 +101,7 @@ def of_boxes(entry: Entry, seed: int, suite: str, number: int, data: Path) -> It
         )  # fmt: skip
         return at_true_places(truth, found)
 
-    yield Input((suite, view.name), truth, grouped, most=at_most(truth, boxes))
+    yield Input((suite, view.name), truth, grouped, most=at_most(truth, boxes), seen=truly_grouped(truth, boxes))
 
 
 def of_blob(entry: Entry, seed: int, suite: str, number: int, data: Path) -> Iterator[Input]:
@@ -152,7 +153,8 @@ class Found:
         self.most.append(given.most)
         self.scores[sequence] = [float(found[key]) for key in KEYS]
         self.lives.append(lives_of_tracks(tracks, truth.fps))
-        self.true.append(lives_of_truth(truth))
+        seen = given.seen
+        self.true.append(lives_of_truth(truth) if seen is None else lives_of_tracks(seen, truth.fps))
 
     def cells(self) -> list[str]:
         """Returns the cells of `COLUMNS`."""

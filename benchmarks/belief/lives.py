@@ -1,4 +1,7 @@
-"""How long groups last as they are: a stretch is a time in which exactly the same people are one group."""
+"""How long groups last as they are: a stretch is a time in which exactly the same people are one group.
+
+Gaps of up to 1 s between two frames in which a person is in the same group do not count: the person or a mate is missed.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ import numpy as np
 
 from sim.types import Array, Ints, Tracks, Truth
 
-MISSED = 1.0  # s: people who are missed for so long or less count with their last group
+MISSED = 1.0  # s: longest gap
 
 
 def lives_of_truth(truth: Truth) -> Array:
@@ -32,12 +35,13 @@ def lives(frame: Ints, id: Ints, group: Ints, length: int, fps: float) -> Array:
     people, column = np.unique(id, return_inverse=True)
     label = np.full((length + 1, len(people)), -1)
     label[frame, column] = group
-    last = np.full((length + 1, len(people)), -1)
-    last[frame, column] = frame
-    last = np.maximum.accumulate(last, axis=0)
-    now = np.arange(length + 1)[:, None]
-    held = (last >= 0) & (now - last <= MISSED * fps)
-    label = np.where(held, np.take_along_axis(label, np.maximum(last, 0), axis=0), -1)
+    index = np.arange(length + 1)[:, None]
+    before = np.maximum.accumulate(np.where(label >= 0, index, 0), axis=0)
+    after = np.minimum.accumulate(np.where(label >= 0, index, length + 1)[::-1], axis=0)[::-1]
+    end = np.minimum(after, length)
+    same = np.take_along_axis(label, before, 0) == np.take_along_axis(label, end, 0)
+    gap = (after - before - 1 <= MISSED * fps) & (after <= length) & same
+    label = np.where(gap, np.take_along_axis(label, before, 0), label)
     begun, found = dict[tuple[int, ...], int](), list[float]()
     for index in range(1, length + 1):
         sets = _sets(label[index])
