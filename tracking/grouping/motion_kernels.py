@@ -21,8 +21,8 @@ def add_to_motion(
     walker's velocity, m/s, correlation time of errors, s, time for which a person's own noise counts, s, weight of the
     noise of all, and longest jump, m. State by person: recent (K, W, 4), step, time, x, y of the last W rows; sums
     (K, T, 7); spread (K, 4), weighted sums of the noise xx, xy, yy, m², and its weight. pooled (4,): these sums of all
-    people. Out: vel (R, 2), slope (R, T, 2), m/s, nan if unknown; place (R, 2), m, by the last regression; noise (R, 3),
-    m²: xx, xy, yy.
+    people. Out: vel (R, 2), slope (R, T, 2), m/s, nan if unknown; place (R, 2), m, by the last regression; noise (R,
+    3), m²: xx, xy, yy.
     """
     legs, correlation, own, common, jump = settings
     low = 0
