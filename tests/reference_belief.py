@@ -1,4 +1,4 @@
-"""Slow, obvious twins of the belief: evidence of pairs, beliefs over time, and average linkage."""
+"""Slow, obvious twins of the belief: evidence of pairs, beliefs over time, and linkage."""
 
 from __future__ import annotations
 
@@ -176,15 +176,16 @@ def log_odds(belief, row):
 
 
 def groups(people, log_odds, unseen):
-    """Average linkage of one step, one join at a time; log_odds: dict from (a, b), a < b."""
+    """Linkage of one step, one join at a time; log_odds: dict from (a, b), a < b."""
     parts = [frozenset([p]) for p in people]
     while True:
         best = None
         for x, y in combinations(parts, 2):
-            linked = [log_odds.get((min(p, q), max(p, q)), unseen) for p in x for q in y]
-            mean = sum(linked) / len(linked)
-            if mean > 0 and (best is None or mean > best[0]):
-                best = mean, x, y
+            linked = {(p, q): log_odds.get((min(p, q), max(p, q)), unseen) for p in x for q in y}
+            nearest = [max(linked[p, q] for q in y) for p in x] + [max(linked[p, q] for p in x) for q in y]
+            worth = (sum(linked.values()) / len(linked) + sum(nearest) / len(nearest)) / 2
+            if worth > 0 and (best is None or worth > best[0]):
+                best = worth, x, y
         if best is None:
             return {p for p in parts if len(p) > 1}
         parts = [p for p in parts if p not in best[1:]] + [best[1] | best[2]]

@@ -50,6 +50,8 @@ CHANGED: Mapping[str, dict[str, float]] = {
     "`stay` = `come`": {"stay": 1.2},
     "`come` 0": {"come": 0.0},
     "`memory` 0 s": {"memory": 0.0},
+    "`hold` = `join` = 0": {"hold": 0.0, "join": 0.0},
+    "`nearest` 0": {"nearest": 0.0},
 }
 ERRORS = Errors(0.15, 0.6)
 SUITES = ("standard", "friends-meet", "streets")

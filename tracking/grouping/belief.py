@@ -37,7 +37,7 @@ FROZEN = Path(__file__).with_name("belief.toml")  # The default belief.
 KIND = "belief"
 UNSEEN = -4.0  # Belief about two people who are too far apart for a row: log-odds.
 DECISIONS = NOW, EVENTS = ("now", "events")  # Columns of a table.
-NUMBERS = ("share", "hold", "join", "stay", "come", "memory")  # Numbers of `Belief` in its file.
+NUMBERS = ("share", "hold", "join", "stay", "come", "nearest", "memory")  # Numbers of `Belief` in its file.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +64,7 @@ class Belief:
     join: float = 0.1
     stay: float = 7.0
     come: float = 1.2
+    nearest: float = 0.5  # share of the nearest pairs, not all, in what two groups are worth together
     memory: float = 1.0  # (s): a missed member stays so long in the group
 
     @property

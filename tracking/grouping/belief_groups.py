@@ -1,7 +1,8 @@
-"""Consistent groups from beliefs of pairs, by average linkage.
+"""Consistent groups from beliefs of pairs, by linkage.
 
-The two groups (or people) with the highest mean over their pairs are joined, as long as it is above 0. So a chain of
-strangers is no group, and a group whose ends are far apart is one. Groups of *now* take a pair's probability minus the
+The two groups (or people) that are worth most together are joined, as long as that is above 0: half the mean over all
+their pairs, and half the mean over their people of the best pair with the other group. So a chain of strangers is no
+group, and a group whose ends are far apart is one. Groups of *now* take a pair's probability minus the
 belief's threshold, groups of *events* its log-odds; both with a memory of the step before.
 """
 
@@ -47,7 +48,7 @@ class StepGroups:
 
 def groups_of_steps(
     shape: tuple[int, int], step: Ints, a: Ints, b: Ints, values: Array, unseen: float, stay: float = 0.0,
-    come: float = 0.0,
+    come: float = 0.0, nearest: float = 0.5,
 ) -> StepGroups:  # fmt: skip
     """Returns the groups of each step.
 
@@ -65,7 +66,7 @@ def groups_of_steps(
         ends = cut[low : low + size + 1]
         label = np.full((len(ends), people), -1)
         label[0] = before
-        linked_groups(np.append(ends[0], ends), a, b, values, unseen, stay, come, label)
+        linked_groups(np.append(ends[0], ends), a, b, values, unseen, stay, come, nearest, label)
         at, person = np.nonzero(label[1:] >= 0)
         found.append((at + low, person, label[at + 1, person]))
         before = label[-1]
@@ -104,7 +105,7 @@ def belief_groups(
     now = groups_of_steps(
         shape, *pairs, gain, float(belief.together(np.array(UNSEEN), np.array(0.0))), belief.hold, belief.join
     )
-    lasting = groups_of_steps(shape, *pairs, log_odds, UNSEEN, belief.stay, belief.come)
+    lasting = groups_of_steps(shape, *pairs, log_odds, UNSEEN, belief.stay, belief.come, belief.nearest)
     return FoundGroups(_links(lasting, size, found, seen, frames_of(SEARCHED * fps / size, 1.0)), now, size)
 
 

@@ -1,6 +1,6 @@
 """Numba kernels of the belief, in the order of its steps: evidence of pairs, sums of tables, share of mates, partition.
 
-Evidence: exponential means over a pair's rows. Partition: average linkage in each step, with a memory of the step
+Evidence: exponential means over a pair's rows. Partition: linkage of groups in each step, with a memory of the step
 before.
 """
 
@@ -110,11 +110,11 @@ def shifts_of_share(
 
 @njit(cache=True)
 def linked_groups(
-    cut: Ints, a: Ints, b: Ints, values: Array, unseen: float, stay: float, come: float, label: Ints
+    cut: Ints, a: Ints, b: Ints, values: Array, unseen: float, stay: float, come: float, nearest: float, label: Ints
 ) -> None:
-    """Finds the groups of each of S steps by average linkage, with a memory of the step before.
+    """Finds the groups of each of S steps by linkage, with a memory of the step before.
 
-    cut (S + 1,): where the rows of each step begin in a, b, values (R,). label (S, P): filled with the lowest member
+    cut (S + 1,): where the rows of each step begin in a, b, values (R,). nearest: as of `_linkage`. label (S, P): filled with the lowest member
     of each person's group; -1, as given, where a person is alone.
     """
     # Only people whose value is positive with somebody can be in a group: the table of a step has these alone.
@@ -144,7 +144,7 @@ def linked_groups(
             u, v = place[a[r]], place[b[r]]
             if u >= 0 and v >= 0 and x[u, v] > -np.inf:
                 x[u, v] = x[v, u] = values[r] + _memory(before, a[r], b[r], stay, come)
-        group = _average_linkage(x)
+        group = _linkage(x, nearest)
         for u in range(count):
             place[node[u]], root[node[u]] = -1, node[u]
             for v in range(u):
@@ -159,34 +159,51 @@ def _memory(before: Ints, p: int, q: int, stay: float, come: float) -> float:
 
 
 @njit(cache=True)
-def _average_linkage(x: Array) -> Ints:
-    """Returns the group (M,) of each person, its lowest member; x (M, M): values of pairs, changed in place."""
+def _linkage(x: Array, nearest: float) -> Ints:
+    """Returns the group (M,) of each person, its lowest member; x (M, M): values of pairs.
+
+    Two groups are worth the mean over all their pairs times 1 - nearest, plus the mean over their people of the best
+    value with somebody of the other group times nearest. The two that are worth most are joined.
+    """
     count = len(x)
     size, group, best = np.empty(count), np.empty(count, np.int64), np.empty(count, np.int64)
+    # by person and group: best value; by group and group: sum of these over the people of the first, and mean of all
+    most, total, mean, worth = x.copy(), x.copy(), x.copy(), x.copy()
     for u in range(count):
         size[u], group[u] = 1.0, u
     for u in range(count):
-        best[u] = _best_partner(x, size, u)
+        best[u] = _best_partner(worth, size, u)
     while True:
         u = -1
         for p in range(count):
             # each group remembers its best partner, so that most joins cost M operations
-            if size[p] > 0 and best[p] >= 0 and (u < 0 or x[p, best[p]] > x[u, best[u]]):
+            if size[p] > 0 and best[p] >= 0 and (u < 0 or worth[p, best[p]] > worth[u, best[u]]):
                 u = p
-        if u < 0 or x[u, best[u]] <= 0:
+        if u < 0 or worth[u, best[u]] <= 0:
             return group
         u, v = min(u, best[u]), max(u, best[u])
         for q in range(count):
-            if size[q] > 0 and q != u and q != v:
-                x[u, q] = x[q, u] = (size[u] * x[u, q] + size[v] * x[v, q]) / (size[u] + size[v])
-        size[u], size[v] = size[u] + size[v], 0.0
-        for q in range(count):
             if group[q] == v:
                 group[q] = u
+            if size[q] > 0 and q != u and q != v:
+                mean[u, q] = mean[q, u] = (size[u] * mean[u, q] + size[v] * mean[v, q]) / (size[u] + size[v])
+                total[u, q] += total[v, q]
+                total[q, u] = 0.0
+        size[u], size[v] = size[u] + size[v], 0.0
+        for q in range(count):
+            most[q, u] = max(most[q, u], most[q, v])
+            if group[q] != u:
+                total[group[q], u] += most[q, u]
+        for q in range(count):
+            if size[q] > 0 and q != u:
+                best_pairs = (total[u, q] + total[q, u]) / (size[u] + size[q])
+                worth[u, q] = (1 - nearest) * mean[u, q] + nearest * best_pairs
+                worth[q, u] = worth[u, q]
+        for q in range(count):
             if size[q] > 0:
                 if q == u or best[q] == u or best[q] == v:
-                    best[q] = _best_partner(x, size, q)
-                elif best[q] >= 0 and x[q, u] > x[q, best[q]]:
+                    best[q] = _best_partner(worth, size, q)
+                elif best[q] >= 0 and worth[q, u] > worth[q, best[q]]:
                     best[q] = u
 
 

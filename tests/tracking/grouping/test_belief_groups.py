@@ -28,7 +28,7 @@ def parts(label):
 
 @pytest.mark.parametrize("seed", range(4))
 @pytest.mark.parametrize(("stay", "come"), [(0.0, 0.0), (2.5, 1.5)])
-def test_groups_of_steps_are_average_linkage_one_join_at_a_time(seed, stay, come):
+def test_groups_of_steps_are_linked_one_join_at_a_time(seed, stay, come):
     """Of log-odds to which `stay` is added in groups of the step before, `come` taken elsewhere."""
     r = np.random.default_rng(seed)
     steps, people, unseen = 5, 9, -4.0

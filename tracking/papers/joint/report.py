@@ -101,7 +101,9 @@ class ReportedEvents:
         # the memory decides of people who are missed: what cannot be seen changes nothing
         value = np.where(np.isnan(log_odds), belief.neutral, log_odds)
         a, b = np.nonzero(np.triu(value != UNSEEN, 1))
-        linked_groups(np.array([0, 0, len(a)]), a, b, value[a, b], UNSEEN, belief.stay, belief.come, group)
+        linked_groups(
+            np.array([0, 0, len(a)]), a, b, value[a, b], UNSEEN, belief.stay, belief.come, belief.nearest, group
+        )
         return [frozenset(id[group[1] == g].tolist()) for g in np.unique(group[1][group[1] >= 0])]
 
     def _parted(self, groups: Members, log_odds: Array) -> dict[PersonSet, bool]:
