@@ -54,7 +54,7 @@ def groups_of_steps(
 
     step, a, b, values (R,): one row per pair (a, b) and step, step ascending; pairs without a row have the value
     `unseen`. stay is added to the value of a pair that was in one group in the step before, come is subtracted from
-    the value of any other pair.
+    the value of any other pair. nearest: as of `Belief`.
     """
     from tracking.grouping.belief_kernels import linked_groups
 
@@ -102,9 +102,8 @@ def belief_groups(
     row, step, log_odds = row[order], step[order], log_odds[order]
     pairs = (step, found.a[row], found.b[row])
     gain = belief.together(found.log_odds[row, 0], found.noise[row])
-    now = groups_of_steps(
-        shape, *pairs, gain, float(belief.together(np.array(UNSEEN), np.array(0.0))), belief.hold, belief.join
-    )
+    unseen = float(belief.together(np.array(UNSEEN), np.array(0.0)))
+    now = groups_of_steps(shape, *pairs, gain, unseen, belief.hold, belief.join, belief.nearest)
     lasting = groups_of_steps(shape, *pairs, log_odds, UNSEEN, belief.stay, belief.come, belief.nearest)
     return FoundGroups(_links(lasting, size, found, seen, frames_of(SEARCHED * fps / size, 1.0)), now, size)
 
