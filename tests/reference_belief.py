@@ -19,11 +19,10 @@ def evidence(pos, time, seconds):
     noise = noises(pos, time, seen)
     for t in range(steps):
         vel = {p: chord(pos, time, t, p, seconds) for p in seen[t]}
-        lines = {(p, span): regression(pos[: t + 1, p], time[: t + 1, p], span) for p in seen[t] for span in SLOPES}
-        slope, place = {key: line[0] for key, line in lines.items()}, {p: lines[p, 4.0][1] for p in seen[t]}
+        slope = {(p, span): regression(pos[: t + 1, p], time[: t + 1, p], span) for p in seen[t] for span in SLOPES}
         for a, b in combinations(seen[t], 2):
             if np.hypot(*(pos[t, b] - pos[t, a])) < 4.0:
-                row = instant(pos[t], vel, a, b) | {"file": file(place, slope, a, b, seen[t])}
+                row = instant(pos[t], vel, a, b) | {"file": file(pos[t], slope, a, b, seen[t])}
                 past.setdefault((a, b), []).append((t, row | others(pos[t], vel, a, b)))
                 offsets.setdefault((a, b), []).append((t, pos[t, b] - pos[t, a]))
                 row = {
@@ -48,12 +47,12 @@ def evidence(pos, time, seconds):
 
 
 def regression(pos, time, span):
-    """Slope and present value of the weighted least squares line through what was seen up to now."""
+    """Slope of the weighted least squares line through what was seen up to now, nan for one position."""
     known = np.isfinite(pos[:, 0])
     if known.sum() < 2:
-        return np.full(2, math.nan), pos[known][0]
+        return np.full(2, math.nan)
     weights = np.exp((time[known] - time[known][-1]) / span)
-    return np.polyfit(time[known] - time[known][-1], pos[known], 1, w=np.sqrt(weights))
+    return np.polyfit(time[known] - time[known][-1], pos[known], 1, w=np.sqrt(weights))[0]
 
 
 def noises(pos, time, seen):
@@ -87,7 +86,7 @@ def length_in(vector, usual, error):
 
 
 def file(pos, slope, a, b, seen):
-    """At how many ends of the pair somebody goes on in line along their way; pos: dict by person."""
+    """At how many ends of the pair somebody goes on in line along their way."""
     apart, way = pos[b] - pos[a], (slope[a, 4.0] + slope[b, 4.0]) / 2
     if not np.hypot(*way) >= 0.3 or not np.hypot(*apart) < 1.8:
         return math.nan

@@ -197,7 +197,9 @@ def _linkage(x: Array, nearest: float) -> Ints:
         for q in range(count):
             if size[q] > 0 and q != u:
                 best_pairs = (total[u, q] + total[q, u]) / (size[u] + size[q])
-                worth[u, q] = (1 - nearest) * mean[u, q] + nearest * best_pairs
+                # people who nobody connects are never joined
+                known = mean[u, q] > -np.inf
+                worth[u, q] = (1 - nearest) * mean[u, q] + nearest * best_pairs if known else -np.inf
                 worth[q, u] = worth[u, q]
         for q in range(count):
             if size[q] > 0:

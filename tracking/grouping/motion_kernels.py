@@ -13,7 +13,7 @@ FASTEST = 1.5  # m/s: standard deviation of the velocity of whoever was not seen
 @njit(cache=True)
 def add_to_motion(
     step: Ints, person: Ints, pos: Array, time: Array, chord: int, times: Array, settings: Array, recent: Array,
-    sums: Array, spread: Array, pooled: Array, vel: Array, slope: Array, place: Array, noise: Array,
+    sums: Array, spread: Array, pooled: Array, vel: Array, slope: Array, noise: Array,
 ) -> None:  # fmt: skip
     """Adds rows (R,), steps ascending, to the state of their people, and writes velocities and noise after each step.
 
@@ -21,8 +21,7 @@ def add_to_motion(
     walker's velocity, m/s, correlation time of errors, s, time for which a person's own noise counts, s, weight of the
     noise of all, and longest jump, m. State by person: recent (K, W, 4), step, time, x, y of the last W rows; sums
     (K, T, 7); spread (K, 4), weighted sums of the noise xx, xy, yy, m², and its weight. pooled (4,): these sums of all
-    people. Out: vel (R, 2), slope (R, T, 2), m/s, nan if unknown; place (R, 2), m, by the last regression; noise (R,
-    3), m²: xx, xy, yy.
+    people. Out: vel (R, 2), slope (R, T, 2), m/s, nan if unknown; noise (R, 3), m²: xx, xy, yy.
     """
     legs, correlation, own, common, jump = settings
     low = 0
@@ -32,7 +31,7 @@ def add_to_motion(
             k = person[high]
             _add_noise(recent[k], spread[k], pooled, step[high], time[high], pos[high], legs, correlation, own, jump)
             for n in range(len(times)):
-                _add_slope(sums[k, n], time[high] - recent[k, 0, 1], times[n], pos[high], slope[high, n], place[high])
+                _add_slope(sums[k, n], time[high] - recent[k, 0, 1], times[n], pos[high], slope[high, n])
             recent[k, 1:] = recent[k, :-1].copy()
             recent[k, 0, 0], recent[k, 0, 1] = step[high], time[high]
             recent[k, 0, 2], recent[k, 0, 3] = pos[high, 0], pos[high, 1]
@@ -77,9 +76,8 @@ def _add_noise(
 
 
 @njit(cache=True)
-def _add_slope(sums: Array, lasted: float, time: float, pos: Array, slope: Array, place: Array) -> None:
-    """Adds a position to an exponentially weighted linear regression over time, and writes its slope, nan at first, and
-    its value now.
+def _add_slope(sums: Array, lasted: float, time: float, pos: Array, slope: Array) -> None:
+    """Adds a position to an exponentially weighted linear regression over time, and writes its slope, nan at first.
 
     sums (7,): of the weights w, w t, w t², w x, w y, w t x, w t y, with times t before the last row. lasted: s since.
     """
@@ -95,7 +93,6 @@ def _add_slope(sums: Array, lasted: float, time: float, pos: Array, slope: Array
     wide = sums[0] * sums[2] - sums[1] * sums[1]
     for d in range(2):
         slope[d] = (sums[0] * sums[5 + d] - sums[1] * sums[3 + d]) / wide if wide > 0 else np.nan
-        place[d] = (sums[2] * sums[3 + d] - sums[1] * sums[5 + d]) / wide if wide > 0 else pos[d]
 
 
 @njit(cache=True)

@@ -42,7 +42,7 @@ def test_noise_of_one_person_is_told_from_that_of_all():
     step, column = np.divmod(np.arange(steps * 6), 6)
     noise = motion.add(step, column, error.reshape(-1, 2), step * 0.4).noise[-6:, 0]
     assert noise[5] > 10 * noise[:5].max()
-    late = motion.new(np.zeros((2, 2)), np.zeros((2, 2))).noise
+    late = motion.new(np.zeros((2, 2))).noise
     assert (late[0] == late[1]).all()
     assert noise[:5].max() < late[0, 0] < noise[5], "who is new has the noise of all"
 
@@ -52,6 +52,5 @@ def test_velocities_by_regression_of_uniform_motion_are_exact():
     pos, motion = np.column_stack([3 + 0.5 * step, 1 - 0.2 * step]), PersonMotion(1, 0.4)
     found = motion.add(step, np.zeros(12, np.int64), pos, 0.4 * step)
     np.testing.assert_allclose(found.slope[1:], np.tile([1.25, -0.5], (11, 2, 1)), atol=1e-9)
-    np.testing.assert_allclose(found.place, pos, atol=1e-9)
     assert np.isnan(found.slope[0]).all()
     assert np.isnan(found.vel[0]).all()
