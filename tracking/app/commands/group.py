@@ -17,6 +17,7 @@ from tracking.grouping.belief import Belief, pair_probabilities
 from tracking.grouping.grouping_choice import default_grouping, grouping_of
 from tracking.recordings.options import refuse_options
 from tracking.running import run as runs
+from tracking.running.explained_people import people_at_places
 
 Peopled = GroupOptions | FitGroupingOptions
 
@@ -42,9 +43,9 @@ def group(options: GroupOptions) -> CommandResult:
     with ProgressMeter("group", len(sequences)) as meter:
         for sequence, tracks, folder in zip(sequences, stored, folders, strict=True):
             run = runs.group(sequence, None if tracks is None else tracks.read(sequence), grouping=grouping)
-            scale, pairs = run.info["px_per_m"] or 1.0, None
+            pairs = None
             if options.probabilities and isinstance(belief, Belief):
-                pairs = pair_probabilities(run, sequence.fps, scale, belief)
+                pairs = pair_probabilities(people_at_places(sequence, run), sequence.fps, belief)
             labelled = replace(sequence, load_truth=None) if sequence.source["kind"] == TEXT else sequence
             run.write(folder, labelled, pairs)
             rows.append({**group_row(run, folder), "pairs": None if pairs is None else len(pairs.frame)})
