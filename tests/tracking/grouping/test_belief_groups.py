@@ -10,7 +10,8 @@ import pytest
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tests import reference_belief as slow
-from tracking.grouping.belief import default_belief, pair_probabilities
+from tracking.grouping import belief_groups as module
+from tracking.grouping.belief import PairBeliefs, default_belief, pair_probabilities
 from tracking.grouping.belief_groups import belief_groups, groups_of_steps
 from tracking.grouping.person_motion import frames_per_step
 from tracking.grouping.tracks_table import TracksTable
@@ -121,6 +122,17 @@ def test_a_missed_pair_that_was_seen_apart_is_not_together():
     rows = side_by_side([*[1.0] * 30, *[20.0] * 3, *[20.0] * 10])
     seen = (rows[1] == 0) | (rows[0] < 33)
     assert (tabled(belief_groups(*rows, default_belief(), seen).now)[30:] < 0).all()
+
+
+def test_whether_a_removal_is_sure_follows_from_what_was_measured(monkeypatch):
+    """The log-odds of the link's time sum to -5; those that a missed pair keeps are left out."""
+    events, step = np.array([3.0, *[-2.0] * 4, *[5.0] * 4, -9.0]), np.arange(10)
+    missed, none = (step > 4) & (step < 9), np.zeros(10, np.int64)
+    found = PairBeliefs(step, none, none + 1, np.column_stack([events, events]), np.zeros(10), missed)
+    monkeypatch.setattr(module, "beliefs_of_tracks", lambda *_: found)
+    links = belief_groups(*side_by_side([1.0] * 10), default_belief()).links
+    assert links.on.tolist() == [True, False]
+    assert not links.sure[1]
 
 
 @pytest.mark.parametrize("fps", [2.5, 10.0])
