@@ -193,7 +193,9 @@ def probabilities(folder: Path) -> dict[tuple[int, int], float]:
     """The mean probability of each pair."""
     table = pq.read_table(folder / "pairs.parquet").to_pydict()
     pairs = list(zip(table["a"], table["b"], strict=True))
-    return {pair: np.mean([p for q, p in zip(pairs, table["probability"], strict=True) if q == pair]) for pair in {*pairs}}
+    return {
+        pair: np.mean([p for q, p in zip(pairs, table["probability"], strict=True) if q == pair]) for pair in {*pairs}
+    }
 
 
 def test_probabilities_are_of_the_places_on_the_ground(seen_from_above, tmp_path, capsys):
