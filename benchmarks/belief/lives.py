@@ -1,6 +1,6 @@
 """How long groups last as they are: a stretch is a time in which exactly the same people are one group.
 
-Gaps of up to 1 s between two frames in which a person is in the same group do not count: the person or a mate is missed.
+Gaps of up to 1 s between two frames in which a person is in the same group do not count: somebody is missed.
 """
 
 from __future__ import annotations

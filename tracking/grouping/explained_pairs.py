@@ -1,8 +1,8 @@
 """Why two people are taken as together: the belief of each pair and step, divided into its quantities.
 
-The log-odds of *now* are a bias, the sum of all tables, and what the share of mates seen so far adds (`SHARE`).
-`explain` sums the tables of each quantity over the times of its means, as these tables are fitted together and only
-their sum has a meaning.
+The log-odds of *now* are the bias at the noise of the row, the sum of all tables, and what the share of mates seen so
+far adds (`SHARE`). `explain` sums the tables of each quantity over the times of its means, as these tables are fitted
+together and only their sum has a meaning.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from tracking.grouping.tracks_table import TracksTable
 # Columns of `ExplainedPairs.values`: what the two do now, over 0.8 s, and what they did lately.
 VALUES = (
     "distance, 0.8 s", "sideways, 0.8 s", "lengthwise, 0.8 s", "velocity difference, 0.8 s", "growth, 5 s", "turn, 5 s",
-    "one walks, 5 s",
+    "one walks, 5 s", "file, 5 s", "pace, 1.5 s", "offset in noise, 5 s", "velocity difference in noise, 4 s",
 )  # fmt: skip
 SHARE = "share of mates"  # Name of a term.
 
@@ -48,6 +48,8 @@ class ExplainedPairs:
     quantities: tuple[str, ...]  # Q names
     terms: np.ndarray  # (R, Q), float32: the parts of `log_odds` beside the bias
     values: np.ndarray  # (R, len(VALUES)), float32, nan if unknown
+    noise: Array  # (R,): of the two people's positions, m
+    bias: Array  # (R,): log-odds before any evidence, at this noise
     threshold: Array  # (R,): probability above which the two are together
 
     @property
@@ -62,7 +64,7 @@ class ExplainedPairs:
 
     def take(self, rows: Ints) -> ExplainedPairs:
         """Returns the rows with the indices `rows`, ascending; pairs keep their numbers."""
-        names = ("step", "a", "b", "pair", "log_odds", "terms", "values", "threshold")
+        names = ("step", "a", "b", "pair", "log_odds", "terms", "values", "noise", "bias", "threshold")
         return replace(self, **{name: getattr(self, name)[rows] for name in names})
 
 
@@ -77,21 +79,21 @@ def explain(table: TracksTable, fps: float, belief: Belief) -> ExplainedPairs:
         whole = belief.log_odds(rows.values, rows.noise)[:, 0]
         shift = share.add(rows.step, rows.pair, whole)
         terms = np.column_stack([*(p.log_odds(rows.values, rows.noise)[:, 0] for p in parts.values()), shift])
-        least, values = np.interp(rows.noise, belief.noise, belief.threshold), rows.values[:, shown]
-        numbers = (terms.astype(np.float32), values.astype(np.float32), least)
+        bias, least = (np.interp(rows.noise, belief.noise, x) for x in (belief.bias[0], belief.threshold))
+        numbers = (terms.astype(np.float32), rows.values[:, shown].astype(np.float32), rows.noise, bias, least)
         found.append((rows.step, rows.a, rows.b, whole + shift, *numbers))
     none, quantities = np.zeros(0, np.int64), (*parts, SHARE)
-    numbers = (np.zeros((0, len(quantities)), np.float32), np.zeros((0, len(VALUES)), np.float32), np.zeros(0))
-    empty = (none, none, none, np.zeros(0), *numbers)
+    tables = (np.zeros((0, len(quantities)), np.float32), np.zeros((0, len(VALUES)), np.float32))
+    empty = (none, none, none, np.zeros(0), *tables, *[np.zeros(0)] * 3)
     columns = [np.concatenate(x) for x in zip(*(found or [empty]), strict=True)]
     order = np.lexsort((columns[0], columns[2], columns[1]))
-    step, a, b, log_odds, terms, values, least = (x[order] for x in columns)
+    step, a, b, log_odds, terms, values, noise, bias, least = (x[order] for x in columns)
     pair = np.cumsum(np.append(False, (np.diff(a) != 0) | (np.diff(b) != 0)))[: len(a)]
     where = np.where(np.isfinite(table.pos), np.rint(100 * table.pos), -1).astype(np.int64)
     people = canonical_hash(("people", float(fps), table.length, table.frame, table.id, where))
     return ExplainedPairs(
         belief, table.ids, people, table.length, size, fps, step, table.ids[a], table.ids[b], pair, log_odds,
-        quantities, terms, values, least,
+        quantities, terms, values, noise, bias, least,
     )  # fmt: skip
 
 

@@ -10,8 +10,11 @@ import pytest
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tests import reference_belief as slow
-from tracking.grouping.belief import default_belief
+from tracking.grouping import belief_groups as module
+from tracking.grouping.belief import PairBeliefs, default_belief, pair_probabilities
 from tracking.grouping.belief_groups import belief_groups, groups_of_steps
+from tracking.grouping.person_motion import frames_per_step
+from tracking.grouping.tracks_table import TracksTable
 
 
 def tabled(found):
@@ -119,3 +122,40 @@ def test_a_missed_pair_that_was_seen_apart_is_not_together():
     rows = side_by_side([*[1.0] * 30, *[20.0] * 3, *[20.0] * 10])
     seen = (rows[1] == 0) | (rows[0] < 33)
     assert (tabled(belief_groups(*rows, default_belief(), seen).now)[30:] < 0).all()
+
+
+def test_whether_a_removal_is_sure_follows_from_what_was_measured(monkeypatch):
+    """The log-odds of the link's time sum to -5; those that a missed pair keeps are left out."""
+    events, step = np.array([3.0, *[-2.0] * 4, *[5.0] * 4, -9.0]), np.arange(10)
+    missed, none = (step > 4) & (step < 9), np.zeros(10, np.int64)
+    found = PairBeliefs(step, none, none + 1, np.column_stack([events, events]), np.zeros(10), missed)
+    monkeypatch.setattr(module, "beliefs_of_tracks", lambda *_: found)
+    links = belief_groups(*side_by_side([1.0] * 10), default_belief()).links
+    assert links.on.tolist() == [True, False]
+    assert not links.sure[1]
+
+
+@pytest.mark.parametrize("fps", [2.5, 10.0])
+def test_probabilities_are_those_of_the_groups(fps):
+    """Of two people, one of whom is predicted for a while: the groups follow from the probabilities alone."""
+    seconds = np.arange(80 * fps) / fps
+    frame, column, pos, length, _ = side_by_side(2.2 + 1.7 * np.sin(seconds / 4))
+    pos[:, 0] = frame / fps
+    seen = (column == 0) | (frame % 50 < 40)
+    belief = default_belief()
+    belief = dataclasses.replace(belief, threshold=np.full(len(belief.noise), 0.4))
+    size = frames_per_step(fps)
+    none, ids = np.full(len(frame), -1), np.array([7, 9])
+    table = TracksTable(frame, ids[column], column, ids, pos, np.full_like(pos, np.nan), none, length, 1.0, seen)
+    found, together, expected = pair_probabilities(table, fps, belief), False, np.zeros(length, bool)
+    told = dict(zip((found.frame - 1).tolist(), found.probability, strict=True))
+    assert set(zip(found.a.tolist(), found.b.tolist(), strict=True)) == {(7, 9)}
+    for k in range(length):
+        if k % size == 0:
+            change = belief.hold if together else -belief.join
+            together = k in told and told[k] - 0.4 + change > 0
+        expected[k] = together
+    now = belief_groups(frame, column, pos, length, fps, belief, seen).now
+    np.testing.assert_array_equal(tabled(now)[np.arange(length) // size, 0] == 0, expected)
+    assert 0.1 < expected.mean() < 0.9
+    assert {*range(40, 50)} <= told.keys(), "where one of the two is predicted, too"

@@ -18,7 +18,11 @@ def test_terms_add_up_to_the_belief():
     np.testing.assert_array_equal(found.a, table.ids[expected.a[order]])
     np.testing.assert_array_equal(found.step, expected.step[order])
     np.testing.assert_allclose(found.log_odds, expected.log_odds[order, 0])
-    np.testing.assert_allclose(found.terms.sum(axis=1) + belief.bias[0], found.log_odds, atol=1e-5)
+    np.testing.assert_allclose(found.terms.sum(axis=1) + found.bias, found.log_odds, atol=1e-5)
+    np.testing.assert_array_equal(found.noise, expected.noise[order])
+    above = found.probability - found.threshold
+    np.testing.assert_allclose(above, belief.together(found.log_odds, found.noise))
+    assert np.ptp(found.bias) > 0.01, "the bias is that of the row's noise"
     assert "nearer others" not in found.quantities, "tables that are 0 for now are left out"
     assert set(VALUES) <= set(NAMES)
     assert (np.diff(found.pair) >= 0).all()

@@ -13,10 +13,12 @@ import pytest
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
+from sim.store.camera_files import camera_document
 from sim.store.seal import NAMES, check_run
-from sim.store.tables import plain
+from sim.store.tables import json_document, plain
 from sim.store.track_files import write_tracks
 from sim.types import Tracks
+from tests.boxed_people import CAMERA, boxed, place
 from tests.recordings import mot_folder
 from tests.refusals import answer, refused
 from tests.sealing import seal_again
@@ -178,6 +180,45 @@ def test_probabilities(walk, tmp_path, capsys):
     assert not (tmp_path / "g" / "pairs.parquet").exists()
 
 
+@pytest.fixture
+def seen_from_above(tmp_path: Path) -> tuple[Path, list]:
+    """Tracked boxes of two people near the camera and two far from it, and the option with its calibration."""
+    info = {"tracker": "mine.py:Mine", "plane": "image", "input": "boxes", "ground": "camera", "px_per_m": 40.0}
+    write_tracks(tmp_path / "boxes", boxed(place(2.0, 14.0)), fps=FPS, info=info)
+    (tmp_path / "above.json").write_bytes(json_document(camera_document(CAMERA)))
+    return tmp_path / "boxes", ["--camera", tmp_path / "above.json"]
+
+
+def probabilities(folder: Path) -> dict[tuple[int, int], float]:
+    """The mean probability of each pair."""
+    table = pq.read_table(folder / "pairs.parquet").to_pydict()
+    pairs = list(zip(table["a"], table["b"], strict=True))
+    return {
+        pair: np.mean([p for q, p in zip(pairs, table["probability"], strict=True) if q == pair]) for pair in {*pairs}
+    }
+
+
+def test_probabilities_are_of_the_places_on_the_ground(seen_from_above, tmp_path, capsys):
+    """1 m apart is the same far and near; by one scale of the image it is not."""
+    boxes, camera = seen_from_above
+    answer(capsys, "group", boxes, "--fps", 10, *camera, "--probabilities", "--out", tmp_path / "g")
+    found = probabilities(tmp_path / "g")
+    assert found.keys() == {(1, 2), (3, 4)}, "the others are 12 m away"
+    assert found[1, 2] == pytest.approx(found[3, 4], abs=0.05)
+    assert check_run(tmp_path / "g")["ground"] == "camera"
+
+
+def test_a_run_of_boxes_does_not_hold_its_camera(seen_from_above, tmp_path, capsys):
+    boxes, camera = seen_from_above
+    line = [str(word) for word in ["group", boxes, "--fps", 10, "--out", tmp_path / "g"]]
+    assert run(line) == 0
+    assert "give it with --camera" in capsys.readouterr().err
+    assert check_run(tmp_path / "g")["ground"] != "camera"
+    assert run([*line, *map(str, camera)]) == 0
+    assert "--camera" not in capsys.readouterr().err
+    assert check_run(tmp_path / "g")["ground"] == "camera"
+
+
 def test_boxes(tmp_path, capsys):
     """In the image by the scale that is given, or that of the first boxes; on the ground by a camera."""
     (tmp_path / "walk.txt").write_text(boxes())
@@ -243,7 +284,7 @@ def test_wrong_options(walk, tmp_path, capsys):
 def test_wrong_runs(walk, tmp_path, capsys):
     answer(capsys, "group", walk, "--fps", 10, "--out", tmp_path / "g")
     line = ["group", tmp_path / "g", "--out", tmp_path / "h"]
-    for option in (["--fps", "10"], ["--px-per-m", "40"]):
+    for option in (["--fps", "10"], ["--px-per-m", "40"], ["--camera", "none.json"]):
         assert f"got {option[0]}; expected none for a run" in refused(capsys, *line, *option)
     answer(capsys, "track", "group-pda", walk, "--fps", 10, "--out", tmp_path / "wholes")
     assert "tracks of whole groups" in refused(capsys, "group", tmp_path / "wholes", "--out", tmp_path / "h")
