@@ -24,6 +24,7 @@ from sim.types import Array, Bools, Tracks, Truth
 from tracking.grouping.belief import Belief, pair_probabilities
 from tracking.grouping.foot_points import standing
 from tracking.grouping.known_people import people_as_tracks
+from tracking.grouping.tracks_table import tabulate
 
 BINS = 15  # of equal width, between the probabilities 0 and 1
 Made = Callable[[Entry, int, int, Path], tuple[Truth, Sequence[Tracks]]]
@@ -67,7 +68,7 @@ def calibration_by_input(names: Sequence[str], seeds: range, belief: Belief, inp
 
 def told(truth: Truth, tracks: Sequence[Tracks], belief: Belief) -> tuple[Array, Bools]:
     """Returns the probability of each pair of one frame, (R,), and whether it is one true group."""
-    pairs = pair_probabilities(tracks, truth.fps, truth.px_per_m, belief)
+    pairs = pair_probabilities(tabulate(tracks, truth.fps, truth.px_per_m), truth.fps, belief)
     size = int(truth.id.max(initial=0)) + 1
     key = truth.frame * size + truth.id
     a, b = (truth.group[np.searchsorted(key, pairs.frame * size + id)] for id in (pairs.a, pairs.b))

@@ -24,6 +24,7 @@ from sim.types import Array, Truth
 from tracking.grouping.belief import Belief, pair_probabilities
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.known_people import people_as_tracks
+from tracking.grouping.tracks_table import tabulate
 from tracking.grouping.online_belief import PairBelief
 
 SCENE, SEED = "crowd-dense", 20_000
@@ -75,9 +76,10 @@ def cost(people: Sequence[int], rounds: int, belief: Belief) -> None:
     for truth in crowds:
         slow = each_step(truth)
         tracks = people_as_tracks(slow)
-        pairs = len(pair_probabilities(tracks, slow.fps, 1.0, belief).frame)
+        table = tabulate(tracks, slow.fps, 1.0)
+        pairs = len(pair_probabilities(table, slow.fps, belief).frame)
         works = (
-            partial(pair_probabilities, tracks, slow.fps, 1.0, belief),
+            partial(pair_probabilities, table, slow.fps, belief),
             partial(derive, tracks, slow.fps, 1.0, belief, objective=True),
         )
         spent = [best_times(work, rounds)[0] for work in works]

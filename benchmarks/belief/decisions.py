@@ -24,6 +24,7 @@ from tracking.grouping import grouping_choice
 from tracking.grouping.belief import Belief, pair_probabilities
 from tracking.grouping.belief_groups import FoundGroups, belief_groups
 from tracking.grouping.known_people import people_as_tracks
+from tracking.grouping.tracks_table import tabulate
 
 DECIDED = ("SPENCER", "now", "groups of events", "probability above 0.5")
 
@@ -35,7 +36,7 @@ def late_groups(*rows: Any, **options: Any) -> FoundGroups:
 
 def probable_pairs(truth: Truth, belief: Belief, i: Ints, j: Ints) -> Bools:
     """Returns which pairs of rows are together with a probability above 0.5."""
-    found = pair_probabilities(people_as_tracks(truth), truth.fps, truth.px_per_m, belief)
+    found = pair_probabilities(tabulate(people_as_tracks(truth), truth.fps, truth.px_per_m), truth.fps, belief)
     told = found.probability > 0.5
     size = int(truth.id.max()) + 1
     low, high = np.sort([truth.id[i], truth.id[j]], axis=0)

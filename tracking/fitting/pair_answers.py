@@ -89,7 +89,7 @@ def _recording_of(file: AnswerFile, recordings: Mapping[str, ExplainedPairs]) ->
             return pairs
     known = ", ".join(f"{name}, {counted(pairs.length, 'frame')}" for name, pairs in recordings.items())
     got = f"other people: of {file.recording}, {counted(file.frames, 'frame')}"
-    remedy = "give the source or the tracks of the page, with the options of `view`"
+    remedy = "give the source or the tracks of the page, with the options of `view`, as its --camera"
     raise InputError(file=file.path, place="people", got=got, expected=f"those of {known}", remedy=remedy)
 
 

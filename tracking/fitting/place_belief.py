@@ -1,33 +1,35 @@
 """`adapt`: a belief for one place, from answers about some of its pairs.
 
-The log-odds of *now* are bias + sum of terms. Those of the place are
+The log-odds of *now* are bias + sum of terms + shift by the share of mates. Those of the place are
 
-    bias + theta_0 + (1 + theta_1) × (terms of place) + (1 + theta_2) × (terms of motion and time),
+    bias + theta_0 + (1 + theta_1) × (terms of place) + (1 + theta_2) × (terms of motion and time) + shift,
 
-as places differ in how many strangers are about, how near they come to each other, and how alike they walk. theta is
+as places differ in how many strangers are about, how near they come to each other, and how alike they walk. The shift
+follows from the changed log-odds of all pairs (`mate_share`): it is computed anew for each estimate of theta. theta is
 the maximum of the posterior with independent normal priors of mean 0, so that few answers change little. An answer
 counts once, as the mean over its rows, and is wrong with probability 0.05, so that a slip about a sure pair does not
-undo what the others say. The threshold has the greatest expected F1 over all pairs of the recording.
+undo what the others say. Thresholds stay: `benchmarks labels` measured less with those of the greatest expected F1.
 Log-odds of events stay, as the answers tell nothing about when groups change.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import minimize
 
 from sim.types import Array, Bools, Ints
-from tracking.fitting.belief import THRESHOLDS
 from tracking.grouping.belief import Belief
-from tracking.grouping.explained_pairs import ExplainedPairs, quantity_of
+from tracking.grouping.explained_pairs import SHARE, ExplainedPairs, quantity_of
+from tracking.grouping.mate_share import MateShare
 
 PLACE = ("distance", "sideways", "lengthwise")  # Quantities of theta_1; all others are of theta_2.
 SPREAD = np.array([1.0, 0.3, 0.3])  # Standard deviations of the priors of theta; `benchmarks labels` compares others.
 PRECISION = np.diag(SPREAD**-2)  # Of the prior.
 SLIP = 0.05  # Probability that an answer is wrong.
+ROUNDS = 20  # Estimates of theta, each with the shift that follows from those before.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,10 +42,26 @@ class Answered:
 
 
 def features(pairs: ExplainedPairs) -> Array:
-    """Returns the slopes (R, 3) of the log-odds in theta."""
-    place = np.isin(pairs.quantities, PLACE)
-    near, other = (pairs.terms[:, side].sum(axis=1, dtype=float) for side in (place, ~place))
+    """Returns the slopes (R, 3) of the log-odds in theta, at a given shift."""
+    place, share = (np.isin(pairs.quantities, names) for names in (PLACE, SHARE))
+    near, other = (pairs.terms[:, side].sum(axis=1, dtype=float) for side in (place, ~place & ~share))
     return np.column_stack([np.ones(len(near)), near, other])
+
+
+def shift_at(pairs: ExplainedPairs, theta: Array) -> Array:
+    """Returns by how much the share of mates shifts the log-odds (R,) of the belief with theta. pairs: all rows of a
+    recording."""
+    former = pairs.terms[:, pairs.quantities.index(SHARE)]
+    log_odds, out = pairs.log_odds - former + features(pairs) @ theta, np.empty(len(pairs.step))
+    order = np.argsort(pairs.step, kind="stable")
+    out[order] = MateShare(pairs.belief.share).add(pairs.step[order], pairs.pair[order], log_odds[order])
+    return out
+
+
+def log_odds_at(pairs: ExplainedPairs, theta: Array, shift: Array) -> Array:
+    """Returns the log-odds (R,) of the belief with theta, at a shift (R,)."""
+    former = pairs.terms[:, pairs.quantities.index(SHARE)]
+    return np.asarray(pairs.log_odds - former + shift + features(pairs) @ theta)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,19 +78,25 @@ def adapt(parts: Sequence[tuple[ExplainedPairs, Answered]]) -> Adapted:
     """Returns the belief of the evidence, adapted to the answers. parts: evidence and answers about each recording, or
     several about one; with at least one answer, and all by one belief."""
     x = np.concatenate([features(pairs)[answers.row] for pairs, answers in parts])
-    log_odds = np.concatenate([pairs.log_odds[answers.row] for pairs, answers in parts])
     together = np.concatenate([answers.together for _, answers in parts])
     cut = np.cumsum([0, *(answers.question[-1] + 1 for _, answers in parts)])
     question = np.concatenate([answers.question + k for (_, answers), k in zip(parts, cut, strict=False)])
-    theta = fit_theta(x, log_odds, together, question)
-    belief = changed(parts[0][0].belief, theta)
-    every = {pairs.people: pairs for pairs, _ in parts}.values()
-    threshold = expected_threshold(np.concatenate([pairs.log_odds + features(pairs) @ theta for pairs in every]))
-    before, after = (np.bincount(question, z) > 0 for z in (log_odds, log_odds + x @ theta))
+    every, still = {pairs.people: pairs for pairs, _ in parts}, np.zeros(3)
+
+    def of_answers(rows: Mapping[str, Array]) -> Array:
+        return np.concatenate([rows[pairs.people][answers.row] for pairs, answers in parts])
+
+    theta = still
+    for _ in range(ROUNDS):
+        shifted = {key: log_odds_at(pairs, still, shift_at(pairs, theta)) for key, pairs in every.items()}
+        # halfway, as the shift follows theta_0, and full steps may go to and fro for ever
+        theta = (theta + fit_theta(x, of_answers(shifted), together, question)) / 2
+    found = {key: log_odds_at(pairs, theta, shift_at(pairs, theta)) for key, pairs in every.items()}
+    former = {key: pairs.log_odds for key, pairs in every.items()}
+    before, after = (np.bincount(question, of_answers(rows)) > 0 for rows in (former, found))
     said = np.bincount(question, together) > 0
     right = int((before == said).sum()), int((after == said).sum())
-    belief = replace(belief, threshold=np.full(len(belief.noise), threshold))
-    return Adapted(belief, theta, right, len(said))
+    return Adapted(changed(parts[0][0].belief, theta), theta, right, len(said))
 
 
 def fit_theta(x: Array, log_odds: Array, together: Bools, question: Ints) -> Array:
@@ -97,14 +121,3 @@ def changed(belief: Belief, theta: Array) -> Belief:
         for t in belief.tables
     )
     return replace(belief, bias=np.stack([belief.bias[0] + theta[0], belief.bias[1]]), tables=tables)
-
-
-def expected_threshold(log_odds: Array) -> float:
-    """Returns the threshold at which the expected F1 of R rows is greatest, if their probabilities are right: twice the
-    expected hits over the rows above it and the expected number of mates. Of several the middle."""
-    probability = 1 / (1 + np.exp(-log_odds))
-    place = (THRESHOLDS * probability).astype(np.int64).clip(0, THRESHOLDS - 1)
-    hits, rows = (np.bincount(place, w, THRESHOLDS)[::-1].cumsum()[::-1] for w in (probability, None))
-    f1 = 2 * hits / np.maximum(rows + probability.sum(), 1e-9)
-    best = np.flatnonzero(f1 >= f1.max() - 1e-12)
-    return float(best[len(best) // 2]) / THRESHOLDS

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim.truth.merge_split_rules import frames_of, runs, stretches
+from sim.truth.merge_split_rules import runs, stretches
 from sim.types import Array, Bools, Ints
-from tracking.grouping.belief import UNSEEN, Belief, PairBeliefs, pair_beliefs
+from tracking.grouping.belief import UNSEEN, Belief, PairBeliefs, beliefs_of_tracks
 from tracking.grouping.link_rule import CELLS, Links
-from tracking.grouping.person_motion import frames_per_step, step_rows
+from tracking.grouping.person_motion import frames_per_step
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,30 +81,17 @@ def belief_groups(
     follow are linked.
     """
     size = frames_per_step(fps)
-    people = int(column.max(initial=0)) + 1
-    rows = slice(None) if measured is None else measured
-    shape = (-(-length // size), people)
-    seen = step_rows(frame[rows], column[rows], pos[rows], length, fps)
-    found = pair_beliefs(seen, size / fps, belief)
-    pair = found.a * people + found.b
-    order = np.lexsort((found.step, pair))
-    step = -(-frame // size)
-    reported = np.unique((column * (shape[0] + 1) + step)[step < shape[0]])
-    memory = frames_of(belief.memory * fps / size, 1.0)
-    row, at = _missed(pair[order], found.step[order], seen.column * (shape[0] + 1) + seen.step, reported, shape, memory)
-    row = np.concatenate([np.arange(len(pair)), order[row]])
-    step = np.concatenate([found.step, at])
+    shape = (-(-length // size), int(column.max(initial=0)) + 1)
+    found = beliefs_of_tracks(frame, column, pos, length, fps, belief, measured)
     # What cannot be seen changes nothing: such pairs are linked if they were in one group in the step before.
-    log_odds = np.concatenate([found.log_odds[:, 1], np.full(len(at), belief.neutral)])
-    order = np.argsort(step, kind="stable")
-    row, step, log_odds = row[order], step[order], log_odds[order]
-    pairs = (step, found.a[row], found.b[row])
-    gain = belief.together(found.log_odds[row, 0], found.noise[row])
+    log_odds = np.where(found.missed, belief.neutral, found.log_odds[:, 1])
+    pairs = (found.step, found.a, found.b)
+    gain = belief.together(found.log_odds[:, 0], found.noise)
     now = groups_of_steps(
         shape, *pairs, gain, float(belief.together(np.array(UNSEEN), np.array(0.0))), belief.hold, belief.join
     )
     lasting = groups_of_steps(shape, *pairs, log_odds, UNSEEN, belief.stay, belief.come)
-    return FoundGroups(_links(lasting, size, found), now, size)
+    return FoundGroups(_links(lasting, size, found.take(~found.missed)), now, size)
 
 
 def _links(label: StepGroups, size: int, found: PairBeliefs) -> Links:
@@ -130,29 +117,3 @@ def _links(label: StepGroups, size: int, found: PairBeliefs) -> Links:
     order = np.lexsort((both, t))
     t, both = t[order], both[order]
     return Links(t * size, both // people, both % people, on[order], sure[order])
-
-
-def _missed(
-    pair: Ints, step: Ints, seen: Ints, reported: Ints, shape: tuple[int, int], memory: int
-) -> tuple[Ints, Ints]:
-    """Returns (row, step) of rows that stand for steps in which one of a pair was missed, up to `memory` steps after
-    both were last reported. seen, reported: column * (S + 1) + step of each person and step, reported sorted. shape:
-    steps S, people P."""
-    steps, people = shape
-    a, b = pair // people, pair % people
-    last = np.concatenate([np.diff(pair) != 0, [True]])[: len(pair)]
-    following = np.where(last, steps, np.append(step[1:], steps)[: len(step)])
-    final = reported[np.diff(reported, append=-1) != 1]  # the ends of stretches in which a person is reported
-    until = [final[np.searchsorted(final, p * (steps + 1) + step)] for p in (a, b)]
-    gone = np.minimum(*(key % (steps + 1) for key in until)) + 1
-    end = np.minimum(following, gone + memory)
-    after = np.minimum(step + 1, steps - 1)
-
-    def both_seen(at: Ints, row: Ints) -> Bools:
-        return np.isin(a[row] * (steps + 1) + at, seen) & np.isin(b[row] * (steps + 1) + at, seen)
-
-    row, at = runs(step + 1, np.where(both_seen(after, np.arange(len(pair))), step + 1, end))
-    # a pair that is seen again without a row is far apart
-    both = np.cumsum(both_seen(at, row))
-    missed = both == np.append(0, both)[np.searchsorted(row, row)]
-    return row[missed], at[missed]

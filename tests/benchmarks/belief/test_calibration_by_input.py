@@ -8,6 +8,7 @@ import pytest
 from benchmarks.belief import calibration_by_input as calibration
 from tests import hand_made
 from tracking.grouping.belief import PairProbabilities
+from tracking.grouping.known_people import people_as_tracks
 
 
 def test_a_calibrated_belief_has_no_error():
@@ -29,6 +30,7 @@ def test_mates_are_those_of_the_frame(monkeypatch):
     scenes = [hand_made.Scene({1: (0.0, 0.0), 2: (0.0, 1.0), 5: (0.0, 2.0)}, g) for g in ({}, together)]
     one = np.array([1, 2, 2]), np.array([1, 1, 2]), np.array([2, 2, 5]), np.array([0.2, 0.9, 0.1])
     monkeypatch.setattr(calibration, "pair_probabilities", lambda *_: PairProbabilities(*one))
-    probability, true = calibration.told(hand_made.truth(scenes), [], None)
+    truth = hand_made.truth(scenes)
+    probability, true = calibration.told(truth, people_as_tracks(truth), None)
     assert probability == pytest.approx([0.2, 0.9, 0.1])
     assert true.tolist() == [False, True, False]

@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
-import numpy as np
-import pytest
+from dataclasses import replace
 
-from tests.near_pairs import evidence_of
+import numpy as np
+
+from tests.near_pairs import evidence_of, table_of, walking
 from tracking.fitting import place_belief
-from tracking.fitting.place_belief import PLACE, Answered, adapt, changed, expected_threshold, features, fit_theta
+from tracking.fitting.place_belief import (
+    PLACE,
+    Answered,
+    adapt,
+    changed,
+    features,
+    fit_theta,
+    log_odds_at,
+    shift_at,
+)
 from tracking.grouping.belief import default_belief
-from tracking.grouping.explained_pairs import quantity_of
+from tracking.grouping.explained_pairs import SHARE, explain, quantity_of
 
 
 def answered(pairs, together, count=20):
@@ -55,27 +65,42 @@ def test_a_slip_about_a_sure_pair_changes_little():
 def test_theta_changes_the_tables_of_now_alone():
     pairs, theta = evidence_of(1), np.array([0.5, -0.2, 0.3])
     belief = changed(pairs.belief, theta)
-    expected = pairs.log_odds + features(pairs) @ theta
     for table, before in zip(belief.tables, pairs.belief.tables, strict=True):
         np.testing.assert_array_equal(table.log_odds[1], before.log_odds[1])
         factor = 0.8 if quantity_of(table.name) in PLACE else 1.3
         np.testing.assert_allclose(table.log_odds[0], factor * before.log_odds[0])
     bias, default = belief.bias, default_belief().bias
     np.testing.assert_allclose(bias, [default[0] + 0.5, default[1]])
-    place = np.isin(pairs.quantities, PLACE)
-    whole = bias[0] + pairs.terms @ np.where(place, 0.8, 1.3)
-    np.testing.assert_allclose(whole, expected, atol=1e-4)
+    np.testing.assert_array_equal(belief.threshold, default_belief().threshold)
 
 
-@pytest.mark.parametrize("shares", [[0.9] * 50, [0.1, 0.3, 0.6, 0.95] * 20, [0.95] * 20 + [0.4] * 40])
-def test_the_threshold_is_best_for_the_expected_f1(shares):
-    p = np.array(shares)
-    found = expected_threshold(np.log(p / (1 - p)))
+def test_log_odds_of_the_place_are_those_of_the_changed_belief():
+    """With the share of mates estimated anew, which few pairs leave near that of the fit."""
+    for people, theta in ((12, [0.5, -0.2, 0.3]), (60, [1.0, 0.3, -0.3])):
+        table = table_of(walking(1, people=people))
+        pairs, theta = explain(table, 2.5, default_belief()), np.array(theta)
+        again = explain(table, 2.5, changed(pairs.belief, theta))
+        shift = shift_at(pairs, theta)
+        np.testing.assert_allclose(shift, again.terms[:, again.quantities.index(SHARE)], atol=0.01)
+        np.testing.assert_allclose(log_odds_at(pairs, theta, shift), again.log_odds, atol=0.01)
+    assert np.abs(shift - shift_at(pairs, np.zeros(3))).max() > 0.1
 
-    def f1(t):
-        return 2 * p[p >= t].sum() / ((p >= t).sum() + p.sum())
 
-    assert f1(found) == pytest.approx(max(f1(t) for t in np.linspace(0, 0.99, 100)))
+def test_the_share_of_mates_is_of_no_theta():
+    pairs = evidence_of(1)
+    share = pairs.quantities.index(SHARE)
+    terms = pairs.terms.copy()
+    terms[:, share] += 1
+    np.testing.assert_array_equal(features(replace(pairs, terms=terms)), features(pairs))
+
+
+def test_theta_fits_the_answers_at_the_share_that_follows_from_it():
+    pairs = evidence_of(0, people=40)
+    answers = answered(pairs, lambda p: np.full(len(p.pair), True))
+    theta = adapt([(pairs, answers)]).theta
+    at = log_odds_at(pairs, np.zeros(3), shift_at(pairs, theta))[answers.row]
+    again = fit_theta(features(pairs)[answers.row], at, answers.together, answers.question)
+    np.testing.assert_allclose(again, theta, atol=1e-3)
 
 
 def test_recordings_count_together():

@@ -104,15 +104,14 @@ def _adapt_grouping(options: FitGroupingOptions) -> CommandResult:
     lines += [
         f"the default belief agrees with {found.right[0]} of {found.count} answers, the adapted one with "
         f"{found.right[1]}",
-        f"bias {bias:+.2f}, place × {1 + near:.2f}, motion and time × {1 + motion:.2f}, threshold "
-        f"{before.threshold:g} → {belief.threshold:g}",
+        f"bias {bias:+.2f}, place × {1 + near:.2f}, motion and time × {1 + motion:.2f}",
     ]
     if len({x.answer for file in files for x in file.answers} - {"don't know"}) == 1:
         lines.append("all answers are of one kind: answer about other pairs, too")
     comments = [shlex.join(["flockscope", "fit", "grouping", *options.names, *asked]), *lines]
     write_file(out, belief.toml_text("\n".join(comments)).encode())
     fitted: dict[str, float] = {"answers": found.count, "agreed before": found.right[0], "agreed": found.right[1]}
-    fitted |= {"bias": bias, "place": 1 + near, "motion": 1 + motion, "threshold": belief.threshold}
+    fitted |= {"bias": bias, "place": 1 + near, "motion": 1 + motion}
     return CommandResult({"file": out, "fitted": fitted}, "\n".join([*lines, _use("--grouping", out)]))
 
 

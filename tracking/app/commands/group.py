@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,8 +16,10 @@ from tracking.app.sequence_workers import source_of
 from tracking.app.stored_tracks import STATED, StoredTracks, check_place, find_tracks, holds_tracks, run_folders
 from tracking.grouping.belief import Belief, pair_probabilities
 from tracking.grouping.grouping_choice import default_grouping, grouping_of
+from tracking.recordings.calibration import read_calibration
 from tracking.recordings.options import refuse_options
 from tracking.running import run as runs
+from tracking.running.explained_people import people_at_places
 
 Peopled = GroupOptions | FitGroupingOptions
 
@@ -42,9 +45,9 @@ def group(options: GroupOptions) -> CommandResult:
     with ProgressMeter("group", len(sequences)) as meter:
         for sequence, tracks, folder in zip(sequences, stored, folders, strict=True):
             run = runs.group(sequence, None if tracks is None else tracks.read(sequence), grouping=grouping)
-            scale, pairs = run.info["px_per_m"] or 1.0, None
+            pairs = None
             if options.probabilities and isinstance(belief, Belief):
-                pairs = pair_probabilities(run, sequence.fps, scale, belief)
+                pairs = pair_probabilities(people_at_places(sequence, run), sequence.fps, belief)
             labelled = replace(sequence, load_truth=None) if sequence.source["kind"] == TEXT else sequence
             run.write(folder, labelled, pairs)
             rows.append({**group_row(run, folder), "pairs": None if pairs is None else len(pairs.frame)})
@@ -76,9 +79,15 @@ def _open(path: Path, options: Peopled) -> list[Sequence]:
 
 
 def _of_run(tracks: StoredTracks, options: Peopled) -> Sequence:
-    known = "px_per_m" if tracks.info.get("plane") != "image" else ""
-    refuse_options(vars(options), f"camera person_class box_scale {known}", tracks.folder, "a run", STATED)
+    """Returns the sequence of a run. A run in the image does not hold its camera, which is that of `options`."""
+    known = "" if tracks.info.get("plane") == "image" else "camera px_per_m"
+    refuse_options(vars(options), f"person_class box_scale {known}", tracks.folder, "a run", STATED)
     sequence = tracks.sequence(options.fps)
+    if options.camera is not None:
+        sequence = replace(sequence, camera=read_calibration(options.camera))
+    elif tracks.info.get("ground") == "camera":
+        text = "its groups were derived with a camera, which the run does not hold; give it with --camera"
+        warnings.warn(f"{tracks.folder}: {text}", UserWarning, stacklevel=2)
     if options.px_per_m is None:
         return sequence
     return replace(sequence, px_per_m=options.px_per_m, source={**sequence.source, "px_per_m_frames": 0})

@@ -16,17 +16,21 @@ from sim.types import Array, Sequence
 from tracking.app.replay_page.page_rows import Json
 from tracking.fitting.questions import choose_questions
 from tracking.grouping.belief import KIND, Belief, default_belief
-from tracking.grouping.explained_pairs import VALUES, ExplainedPairs
+from tracking.grouping.explained_pairs import VALUES, ExplainedPairs, quantity_of
 from tracking.running.explained_people import explained_people
 from tracking.running.run import TrackingRun
 
 MOST_ROWS = 40_000  # Rows of pairs on a page: 1 MB.
 UNKNOWN = 255
-# Lowest value and step of a byte: of probabilities, of log-odds by quantity, and of `VALUES` in their order (m, m/s,
-# rad, share).
+# Lowest value and step of a byte: of probabilities, of log-odds, of the noise of positions, m, and of `VALUES` in their
+# order (m, m/s, rad, share, number of ends, standard deviations).
 PROBABILITY = (0.0, 0.005)
 TERM = (-12.0, 0.1)
-RANGES = ((0.0, 0.02), (0.0, 0.02), (0.0, 0.02), (0.0, 0.02), (-5.0, 0.05), (0.0, 0.02), (0.0, 0.01))
+NOISE = (0.0, 0.01)
+RANGES = (
+    (0.0, 0.02), (0.0, 0.02), (0.0, 0.02), (0.0, 0.02), (-5.0, 0.05), (0.0, 0.02), (0.0, 0.01), (0.0, 0.01),
+    (0.0, 0.02), (0.0, 0.05), (0.0, 0.05),
+)  # fmt: skip
 
 
 def pair_columns(sequence: Sequence, run: TrackingRun | None, belief: Belief | None = None) -> Json | None:
@@ -45,20 +49,24 @@ def pair_columns(sequence: Sequence, run: TrackingRun | None, belief: Belief | N
     new = np.flatnonzero(np.append(True, (np.diff(shown.pair) != 0) | (np.diff(shown.step) != 1))[: len(rows)])
     count = np.diff(np.append(new, len(rows)))
     stints = np.column_stack([shown.a[new], shown.b[new], shown.step[new], count])
-    columns = {name.partition(",")[0]: in_bytes(shown.values[:, k], *RANGES[k]) for k, name in enumerate(VALUES)}
+    columns = {quantity_of(name): in_bytes(shown.values[:, k], *RANGES[k]) for k, name in enumerate(VALUES)}
+    note = _note(run, used)
     return {
         "size": pairs.size,
-        "threshold": used.threshold,
-        "bias": round(float(used.bias[0]), 2),
-        "note": _note(run, used),
+        "note": note,
+        "held": None if run is None or note else [used.hold, used.join],
         "left_out": int((~kept).sum()),
         "stints": stints.tolist(),
         "probability": in_bytes(shown.probability, *PROBABILITY),
+        "threshold": in_bytes(shown.threshold, *PROBABILITY),
+        "bias": in_bytes(shown.bias, *TERM),
+        "noise": in_bytes(shown.noise, *NOISE),
         "values": columns,
-        "ranges": {name.partition(",")[0]: RANGES[k] for k, name in enumerate(VALUES)},
+        "ranges": {quantity_of(name): RANGES[k] for k, name in enumerate(VALUES)},
         "terms": {name: in_bytes(shown.terms[:, q], *TERM) for q, name in enumerate(pairs.quantities)},
         "term_range": TERM,
         "probability_range": PROBABILITY,
+        "noise_range": NOISE,
         "people": pairs.people,
         "questions": [asdict(question) for question in choose_questions(pairs)],
     }

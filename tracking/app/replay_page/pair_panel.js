@@ -87,10 +87,6 @@ function showChoice() {
   $("pair-clear").hidden = a === undefined;
 }
 
-function percent(share) {
-  return share > 0 && share < 0.01 ? "under 1 %" : `${Math.round(100 * share)} %`;
-}
-
 // Draws the charts of the picked pair anew.
 function layOutPair() {
   if (!Object.keys(pairsOf).length) return;
@@ -111,11 +107,11 @@ function showPair(frame) {
   const [a, b] = picked.ids;
   if (pairLine) pairLine(frame);
   $("pair-title").textContent = `${a} and ${b}${row < 0 ? "" : `: together with probability ${percent(pairs.probability[row])}`}`;
-  $("pair-now").textContent = row < 0 ? absence(pairs, stints) : `at ${seconds(frame).toFixed(1)} s; together counts above ${percent(pairs.threshold)}`;
+  $("pair-now").textContent = row < 0 ? absence(pairs, stints, frame) : momentWords(pairs, row, frame);
   $("pair-about").hidden = row < 0;
   if (row < 0) return $("pair-reasons").replaceChildren();
   const { named, rest } = reasonsOf(pairs, stints, row);
-  const lines = [...named, [rest, "all else"], [pairs.bias, "before any evidence: most pairs are strangers"]];
+  const lines = [...named, [rest, "all else"], [pairs.bias[row], "before any evidence: most pairs are strangers"]];
   $("pair-reasons").replaceChildren(...lines.flatMap(([value, words]) => {
     const number = tag("dt", signed(value));
     number.style.color = palette[value < 0 ? 1 : 0];
@@ -128,8 +124,16 @@ function signed(value) {
   return Number(text) === 0 ? "0.0" : `${value < 0 ? "−" : "+"}${text}`;
 }
 
-function absence(pairs, stints) {
-  if (stints.length) return "At this moment they are not within 4 m of each other, or one of them is not seen.";
+// What holds at a moment: when together counts, and why a group is not as this says.
+function momentWords(pairs, row, frame) {
+  const { side, ids } = picked, threshold = pairs.threshold[row], before = Math.floor((frame - 1) / pairs.size) * pairs.size;
+  const held = heldWords(pairs.held, pairs.probability[row], threshold, inOneGroup(side, ids, before), inOneGroup(side, ids, frame));
+  return `At ${seconds(frame).toFixed(1)} s. Positions err by about ${errorOfPositions(pairs.noise[row])}; together counts above ${percent(threshold)}. ${held}`;
+}
+
+function absence(pairs, stints, frame) {
+  const meanwhile = pairs.held && inOneGroup(picked.side, picked.ids, frame) ? " They stay in one group meanwhile." : "";
+  if (stints.length) return `At this moment they are not within 4 m of each other, or one of them is not seen.${meanwhile}`;
   const left = pairs.left_out ? `, or they are one of the ${pairs.left_out} least probable pairs, which this page leaves out` : "";
   return `They never came within 4 m of each other${left}.`;
 }
@@ -141,12 +145,12 @@ function pairChart(box, width, pairs, stints) {
   const svg = element("svg", { role: "img", "aria-label": "Evidence about the two over time; click to go to a moment" });
   const span = width - CHART.gutter - CHART.right, x = frame => CHART.gutter + ((frame - from) / Math.max(to - from, 1)) * span;
   const frameOf = step => step * pairs.size + 1 + (pairs.size - 1) / 2;
-  const lines = names => names.map(([name, words, dash, colour]) => ({ column: pairs.values[name], words, dash, colour }));
+  const lines = names => names.map(([name, words, dash, colour]) => ({ column: pairs.values[name] || pairs[name], words, dash, colour }));
   const place = { svg, x, stints, frameOf, width };
   let y = 14;
   y = pairPlot(place, y, 64, [0, 2, 4], "m", lines([["distance", "distance", "", 0], ["sideways", "sideways", "5 3", 1], ["lengthwise", "lengthwise", "1 3", 3]]));
   y = pairPlot(place, y, 44, [0, 1, 2], "m/s", lines([["velocity difference", "velocity difference", "", 2]]));
-  y = pairPlot(place, y, 60, [0, 0.5, 1], "", [{ column: pairs.probability, words: "probability", dash: "", colour: 4 }], pairs.threshold);
+  y = pairPlot(place, y, 60, [0, 0.5, 1], "", [...lines([["probability", "probability", "", 4]]), { column: pairs.threshold, words: "threshold", dash: "2 3" }]);
   for (const [words, holds, colour] of pairLanes(from, to)) {
     element("text", { x: CHART.gutter, y: y + 4, fill: theme.thing }, svg, words);
     for (const [a, b] of stretchesOf(from, to, holds)) {
@@ -182,7 +186,7 @@ function pairLanes(from, to) {
   return lanes;
 }
 
-function pairPlot({ svg, x, stints, frameOf, width }, top, height, ticks, unit, lines, threshold) {
+function pairPlot({ svg, x, stints, frameOf, width }, top, height, ticks, unit, lines) {
   const most = ticks[ticks.length - 1], y = value => top + 18 + height * (1 - Math.min(value, most) / most);
   for (const tick of ticks) {
     element("line", { x1: CHART.gutter, x2: width - CHART.right, y1: y(tick), y2: y(tick), stroke: theme.grid }, svg);
@@ -190,7 +194,8 @@ function pairPlot({ svg, x, stints, frameOf, width }, top, height, ticks, unit, 
   }
   let at = CHART.gutter;
   for (const { column, words, dash, colour } of lines) {
-    element("line", { x1: at, x2: at + 18, y1: top + 6, y2: top + 6, stroke: palette[colour], "stroke-width": 2.4, "stroke-dasharray": dash }, svg);
+    const stroke = colour === undefined ? theme.ink : palette[colour];
+    element("line", { x1: at, x2: at + 18, y1: top + 6, y2: top + 6, stroke, "stroke-width": 2.4, "stroke-dasharray": dash }, svg);
     element("text", { x: at + 23, y: top + 10 }, svg, words);
     at += 40 + 7 * words.length;
     for (const stint of stints) {
@@ -204,12 +209,8 @@ function pairPlot({ svg, x, stints, frameOf, width }, top, height, ticks, unit, 
           open = true;
         }
       }
-      if (d) element("path", { d, fill: "none", stroke: palette[colour], "stroke-width": 2, "stroke-dasharray": dash, "stroke-linecap": "round" }, svg);
+      if (d) element("path", { d, fill: "none", stroke, "stroke-width": 2, "stroke-dasharray": dash, "stroke-linecap": "round" }, svg);
     }
-  }
-  if (threshold !== undefined) {
-    element("line", { x1: CHART.gutter, x2: width - CHART.right, y1: y(threshold), y2: y(threshold), stroke: theme.ink, "stroke-dasharray": "2 3" }, svg);
-    element("text", { x: at, y: top + 10, fill: theme.thing }, svg, `threshold ${percent(threshold)}`);
   }
   return top + 18 + height + CHART.gap;
 }

@@ -24,6 +24,9 @@ function decodePairs(raw) {
   return {
     ...raw, stints,
     probability: decodeBytes(raw.probability, raw.probability_range),
+    threshold: decodeBytes(raw.threshold, raw.probability_range),
+    bias: decodeBytes(raw.bias, raw.term_range),
+    noise: decodeBytes(raw.noise, raw.noise_range),
     values: columns(raw.values, name => raw.ranges[name]),
     terms: columns(raw.terms, () => raw.term_range),
   };
@@ -71,6 +74,11 @@ function reasonWords(pairs, stints, row, name) {
     turn: () => (known ? `their ways differ by ${Math.round((value(name) * 180) / Math.PI)}°` : "directions of their ways before"),
     "walking difference": () => "speed and direction while both walk",
     "one walks": () => oneWalksWords(value(name)),
+    file: () => fileWords(value(name)),
+    pace: () => (value(name) < 0.3 ? "they stand" : known ? `they walk at ${value(name).toFixed(1)} m/s` : "how fast they walk"),
+    "offset in noise": () => noiseWords("steady offset, given how much positions err", value(name)),
+    "velocity difference in noise": () => noiseWords("difference of velocities, given how much positions err", value(name)),
+    "share of mates": () => shareWords(pairs.terms[name][row]),
     "time near": () => `within 4 m of each other for ${nearSeconds(pairs, stints, row).toFixed(0)} s`,
   };
   return (words[name] || (() => name))();
@@ -83,6 +91,39 @@ function growthWords(speed) {
 
 function oneWalksWords(share) {
   return share > 0.05 ? `one stands and the other walks, ${Math.round(100 * share)} % of the time` : "both walk, or both stand";
+}
+
+function fileWords(ends) {
+  if (Number.isNaN(ends)) return "in no file: they stand, or are too far apart";
+  return ends > 0.1 ? "in one file with others, as in a queue" : "in no file with others";
+}
+
+// A length in units of what mates and errors of positions make of it: of mates it is mostly below 2.
+function noiseWords(words, length) {
+  if (Number.isNaN(length)) return words;
+  return `${words}: ${length < 2 ? "as mates have it" : `${length.toFixed(0)} times that of mates`}`;
+}
+
+function shareWords(shift) {
+  if (Math.abs(shift) < 0.05) return "as many people here are mates as usual";
+  return shift < 0 ? "few people here are mates" : "many people here are mates";
+}
+
+function errorOfPositions(noise) {
+  return noise < 0.095 ? `${Math.max(Math.round(100 * noise), 1)} cm` : `${noise.toFixed(1)} m`;
+}
+
+// Why two people with a probability are, or are not, in one group, where the threshold alone says otherwise; else "".
+// before, now: whether they were in one group a step before, and are now.
+function heldWords(held, probability, threshold, before, now) {
+  if (!held || now === probability > threshold) return "";
+  const [hold, join] = held, least = before ? threshold - hold : threshold + join, ends = percent(Math.max(least, 0));
+  if (now) return before && probability > least ? `In one group because they were a moment before: it lasts down to ${ends}.` : "In one group because of its other members.";
+  return !before && probability <= least ? `Not yet in one group: to come into one takes more than ${ends}.` : "Not in one group because of others near them.";
+}
+
+function percent(share) {
+  return share > 0 && share < 0.01 ? "under 1 %" : `${Math.round(100 * share)} %`;
 }
 
 // The time, s, for which rows of a pair have been seen up to a row.

@@ -6,6 +6,7 @@ const AROUND = 9; // m: width of the plan around the two
 const askedSide = [tracks, truth, other].find(side => side && pairsOf[side.name] && pairsOf[side.name].questions.length);
 const questions = askedSide ? pairsOf[askedSide.name].questions : [];
 const answers = [];
+let saved = ""; // the answers in the file that was saved last
 let asking = null; // what was shown before, while questions are asked
 
 function askedPair() {
@@ -95,6 +96,7 @@ function saveAnswers() {
     href: URL.createObjectURL(new Blob([text], { type: "application/json" })), download: `${data.name.replace(/[^\w.-]+/g, "_")}-pairs.json`,
   });
   link.click();
+  saved = answers.join();
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
@@ -121,4 +123,5 @@ function buildQuestions() {
   $("ask-undo").addEventListener("click", undoAnswer);
   $("ask-save").addEventListener("click", saveAnswers);
   $("ask-stop").addEventListener("click", stopAsking);
+  window.addEventListener("beforeunload", event => { if (answers.join() !== saved) event.preventDefault(); });
 }

@@ -34,6 +34,8 @@ def test_columns_come_back(sequence: Sequence) -> None:
     rows = [(a, b, step + k) for a, b, step, count in stints.tolist() for k in range(count)]
     assert rows == list(zip(pairs.a.tolist(), pairs.b.tolist(), pairs.step.tolist(), strict=True))
     np.testing.assert_allclose(numbers(found["probability"], found["probability_range"]), pairs.probability, atol=0.003)
+    for name, span, near in (("threshold", "probability", 0.003), ("bias", "term", 0.051), ("noise", "noise", 0.006)):
+        np.testing.assert_allclose(numbers(found[name], found[f"{span}_range"]), getattr(pairs, name), atol=near)
     for k, name in enumerate(VALUES):
         quantity = name.partition(",")[0]
         span = found["ranges"][quantity]
@@ -82,8 +84,15 @@ def test_the_page_says_whose_groups_and_whose_evidence(sequence: Sequence, track
     assert "rule" in note(sequence, group(sequence, grouping=LinkRule()))
     assert "not stated" in note(sequence, TrackingRun(tuple(tracks)))
     assert "names its groups itself" in note(sequence, TrackingRun(tuple(tracks), {"tracker": "joint"}))
-    shown = pair_columns(sequence, None, other)
-    assert shown["bias"] == pytest.approx(default_belief().bias[0] + 0.5, abs=0.01)
+    shown, default = pair_columns(sequence, None, other), explained_people(sequence, None, default_belief())
+    np.testing.assert_allclose(numbers(shown["bias"], shown["term_range"]), default.bias + 0.5, atol=0.051)
+
+
+def test_groups_last_on_the_page_where_the_belief_made_them(sequence: Sequence, tracks: list[Tracks]) -> None:
+    belief = default_belief()
+    assert pair_columns(sequence, group(sequence))["held"] == [belief.hold, belief.join]
+    assert pair_columns(sequence, None)["held"] is None
+    assert pair_columns(sequence, TrackingRun(tuple(tracks)))["held"] is None
 
 
 def test_without_people_there_is_no_evidence(sequence: Sequence, tmp_path) -> None:

@@ -18,6 +18,7 @@ pytestmark = [pytest.mark.slow, pytest.mark.skipif(CHROMIUM is None, reason="no 
 
 TITLE = "document.getElementById('pair-title').textContent"
 ASKED = "document.getElementById('ask-title').textContent"
+LEAVES = "dispatchEvent(new Event('beforeunload', { cancelable: true }))"  # False: the browser asks before it leaves
 HIDDEN = "document.getElementById('pair').hidden"
 REASONS = "[...document.querySelectorAll('#pair-reasons dt')].map(x => Number(x.textContent.replace('−', '-')))"
 # The frames before and after the replay goes back.
@@ -132,6 +133,7 @@ def test_labels_by_keys_are_saved_and_fitted(
     questions = "JSON.parse(document.getElementById('data').textContent).pairs.tracks.questions"
     _, _, first, last = page.value(f"Object.values({questions}[0])")
     page.value("{ const s = document.getElementById('speed'); s.value = 8; s.dispatchEvent(new Event('change')) }")
+    assert page.value(LEAVES)
     before, after = page.value(AGAIN)
     assert first <= after < before <= last, "the stretch repeats"
     for key in "122u3":
@@ -140,6 +142,7 @@ def test_labels_by_keys_are_saved_and_fitted(
     for k in range(3, count):
         page.press("12"[k % 2])
     page.wait(f"{ASKED} === 'Thank you'")
+    assert not page.value(LEAVES), "answers would be lost"
     page.press("u")
     page.press("1")
     page.press("1")
@@ -149,6 +152,11 @@ def test_labels_by_keys_are_saved_and_fitted(
         assert time.monotonic() < end, "no file"
         time.sleep(0.1)
     saved = json.loads(file.read_text(encoding="utf-8"))
+    assert page.value(LEAVES)
+    page.press("u")
+    assert not page.value(LEAVES), "the answers are others than the saved ones"
+    page.press("1")
+    assert page.value(LEAVES)
     said = [x["answer"] for x in saved["answers"]]
     assert said[:4] == ["together", "not", "don't know", "not"]
     assert len(said) == count

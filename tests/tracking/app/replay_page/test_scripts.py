@@ -129,7 +129,7 @@ PAIR = """[10, 60, 100, 130].map(frame => {
     const pairs = pairsOf.truth, stints = stintsOf(pairs, [5, 4]), row = pairRowAt(pairs, stints, frame);
     const { named, rest } = reasonsOf(pairs, stints, row);
     return [pairs.probability[row], inOneGroup(truth, [4, 5], frame), inOneGroupOf(tracks, truth, [4, 5], frame),
-        pairs.bias + named.reduce((sum, [value]) => sum + value, rest), named.map(([, words]) => words)];
+        pairs.bias[row] + named.reduce((sum, [value]) => sum + value, rest), named.map(([, words]) => words)];
 }).concat([[stretchesOf(1, 9, frame => frame !== 4 && frame < 8), partnersOf(pairsOf.truth, 4)[0][0],
     stintsOf(pairsOf.truth, [4, 99]), pairRowAt(pairsOf.truth, stintsOf(pairsOf.truth, [4, 5]), 9999)]])"""
 
@@ -150,9 +150,35 @@ def test_evidence_about_two_people(sequence: Sequence, tracks: list[Tracks]) -> 
 
 
 def test_words_about_two_people() -> None:
-    what = "[...[0.34, -0.34, 0, NaN].map(growthWords), ...[0.3, 0].map(oneWalksWords)]"
+    what = """[...[0.34, -0.34, 0, NaN].map(growthWords), ...[0.3, 0].map(oneWalksWords), ...[1, 0, NaN].map(fileWords),
+        ...[-0.4, 0.4, 0].map(shareWords), ...[0.9, 3.3, NaN].map(x => noiseWords("offset", x)),
+        ...[0.004, 0.06, 0.31].map(errorOfPositions)]"""
     assert ran(EMPTY, ("decode.js", "pairs.js"), what) == [
         "moving apart by 0.3 m/s", "coming nearer by 0.3 m/s", "their distance hardly changes",
         "their distance hardly changes", "one stands and the other walks, 30 % of the time",
         "both walk, or both stand",
+        "in one file with others, as in a queue", "in no file with others",
+        "in no file: they stand, or are too far apart", "few people here are mates", "many people here are mates",
+        "as many people here are mates as usual", "offset: as mates have it", "offset: 3 times that of mates", "offset",
+        "1 cm", "6 cm", "0.3 m",
     ]  # fmt: skip
+
+
+def test_every_quantity_has_words(sequence: Sequence) -> None:
+    data = page_data(sequence, []) | {"pairs": {"truth": pair_columns(sequence, None)}}
+    what = """Object.keys(pairsOf.truth.terms).map(name => [name, reasonWords(pairsOf.truth,
+        stintsOf(pairsOf.truth, [4, 5]), 0, name)])"""
+    found = ran(data, ("decode.js", "pairs.js"), what)
+    assert len(found) > 10
+    assert all(words != name for name, words in found)
+
+
+def test_words_about_groups_that_last() -> None:
+    """Probability 0.2 and 0.45 at a threshold of 0.4: by the memory of the step before, or by others."""
+    what = """[[0.2, true, true], [0.2, false, true], [0.1, true, true], [0.2, false, false], [0.45, false, false],
+        [0.45, true, false], [0.55, false, false], [0.45, true, true]].map(
+        ([p, before, now]) => heldWords([0.25, 0.1], p, 0.4, before, now)).concat(heldWords(null, 0.2, 0.4, true, true))"""
+    lasts = "In one group because they were a moment before: it lasts down to 15 %."
+    others, apart = "In one group because of its other members.", "Not in one group because of others near them."
+    comes = "Not yet in one group: to come into one takes more than 50 %."
+    assert ran(EMPTY, ("decode.js", "pairs.js"), what) == [lasts, others, others, "", comes, apart, apart, "", ""]
