@@ -35,7 +35,7 @@ class MateShare:
         more, out = int(pair.max(initial=-1)) + 1 - len(self.latest), np.empty(len(step))
         if more > 0:
             self.latest = np.concatenate([self.latest, np.full(more, -1)])
-        middle = np.array(LOWEST + WIDTH * np.arange(BINS), np.float64)
+        middle = LOWEST + WIDTH * np.arange(BINS, dtype=np.float64)
         shifts_of_share(step, pair, log_odds, middle, self.share, WEIGHT, self.latest, self.counts, self.shift, out)
         return out
 
