@@ -114,8 +114,8 @@ def linked_groups(
 ) -> None:
     """Finds the groups of each of S steps by linkage, with a memory of the step before.
 
-    cut (S + 1,): where the rows of each step begin in a, b, values (R,). nearest: as of `_linkage`. label (S, P): filled
-    with the lowest member of each person's group; -1, as given, where a person is alone.
+    cut (S + 1,): where the rows of each step begin in a, b, values (R,). nearest: as of `_linkage`. label (S, P):
+    filled with the lowest member of each person's group; -1, as given, where a person is alone.
     """
     # Only people whose value is positive with somebody can be in a group: the table of a step has these alone.
     # Connected components of such pairs are never joined, so that groups part whose pairs have no rows any more.
