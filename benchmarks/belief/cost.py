@@ -24,8 +24,8 @@ from sim.types import Array, Truth
 from tracking.grouping.belief import Belief, pair_probabilities
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.known_people import people_as_tracks
-from tracking.grouping.tracks_table import tabulate
 from tracking.grouping.online_belief import PairBelief
+from tracking.grouping.tracks_table import tabulate
 
 SCENE, SEED = "crowd-dense", 20_000
 EVERY = 4  # frames at 10 frames/s in a step of 0.4 s
