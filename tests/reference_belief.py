@@ -20,9 +20,10 @@ def evidence(pos, time, seconds):
     for t in range(steps):
         vel = {p: chord(pos, time, t, p, seconds) for p in seen[t]}
         slope = {(p, span): regression(pos[: t + 1, p], time[: t + 1, p], span) for p in seen[t] for span in SLOPES}
+        place = {p: mean_place(pos[: t + 1, p], time[: t + 1, p], SLOPES[0]) for p in seen[t]}
         for a, b in combinations(seen[t], 2):
             if np.hypot(*(pos[t, b] - pos[t, a])) < 4.0:
-                row = instant(pos[t], vel, a, b) | {"file": file(pos[t], slope, a, b, seen[t])}
+                row = instant(pos[t], vel, a, b) | {"file": file(place, slope, a, b, seen[t])}
                 past.setdefault((a, b), []).append((t, row | others(pos[t], vel, a, b)))
                 offsets.setdefault((a, b), []).append((t, pos[t, b] - pos[t, a]))
                 row = {
@@ -53,6 +54,13 @@ def regression(pos, time, span):
         return np.full(2, math.nan)
     weights = np.exp((time[known] - time[known][-1]) / span)
     return np.polyfit(time[known] - time[known][-1], pos[known], 1, w=np.sqrt(weights))[0]
+
+
+def mean_place(pos, time, span):
+    """Mean over what was seen up to now, with weights exp(-age / span)."""
+    known = np.isfinite(pos[:, 0])
+    weights = np.exp((time[known] - time[known][-1]) / span)
+    return weights @ pos[known] / weights.sum()
 
 
 def noises(pos, time, seen):
@@ -86,7 +94,7 @@ def length_in(vector, usual, error):
 
 
 def file(pos, slope, a, b, seen):
-    """At how many ends of the pair somebody goes on in line along their way."""
+    """At how many ends of the pair somebody goes on in line along their way; pos: dict by person."""
     apart, way = pos[b] - pos[a], (slope[a, 4.0] + slope[b, 4.0]) / 2
     if not np.hypot(*way) >= 0.3 or not np.hypot(*apart) < 1.8:
         return math.nan

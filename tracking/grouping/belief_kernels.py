@@ -91,6 +91,7 @@ def shifts_of_share(
     while low < len(step):
         high = low
         while high < len(step) and step[high] == step[low]:
+            assert not np.isnan(log_odds[high])
             bin = int(min(max(np.floor((log_odds[high] - middle[0]) / width + 0.5), 0.0), len(middle) - 1.0))
             if latest[pair[high]] >= 0:
                 counts[latest[pair[high]]] -= 1

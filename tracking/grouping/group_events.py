@@ -96,8 +96,8 @@ def event_of_change(
         joins = change.kind not in ("split", "dissolve")
         # whoever held a group together may be gone
         pairs = list(combinations(parts.sets, 2))
-        seen = met or not joins
-        onsets = [motion.onset(a, b | parts.gone, t, joins=joins) if seen else None for a, b in pairs]
+        looked = met or not joins
+        onsets = [motion.onset(a, b | parts.gone, t, joins=joins) if looked else None for a, b in pairs]
         unchanged = [pair for pair, onset in zip(pairs, onsets, strict=True) if onset is None]
         if len(set(connected(parts.sets, unchanged))) > 1:
             start = min(onset for onset in onsets if onset is not None)

@@ -13,7 +13,7 @@ FASTEST = 1.5  # m/s: standard deviation of the velocity of whoever was not seen
 @njit(cache=True)
 def add_to_motion(
     step: Ints, person: Ints, pos: Array, time: Array, chord: int, times: Array, settings: Array, recent: Array,
-    sums: Array, spread: Array, pooled: Array, vel: Array, slope: Array, noise: Array,
+    sums: Array, spread: Array, pooled: Array, vel: Array, slope: Array, place: Array, noise: Array,
 ) -> None:  # fmt: skip
     """Adds rows (R,), steps ascending, to the state of their people, and writes velocities and noise after each step.
 
@@ -21,7 +21,8 @@ def add_to_motion(
     walker's velocity, m/s, correlation time of errors, s, time for which a person's own noise counts, s, weight of the
     noise of all, and longest jump, m. State by person: recent (K, W, 4), step, time, x, y of the last W rows; sums
     (K, T, 7); spread (K, 4), weighted sums of the noise xx, xy, yy, m², and its weight. pooled (4,): these sums of all
-    people. Out: vel (R, 2), slope (R, T, 2), m/s, nan if unknown; noise (R, 3), m²: xx, xy, yy.
+    people. Out: vel (R, 2), slope (R, T, 2), m/s, nan if unknown; place (R, 2), m, mean over the first of the times;
+    noise (R, 3), m²: xx, xy, yy.
     """
     legs, correlation, own, common, jump = settings
     low = 0
@@ -32,6 +33,8 @@ def add_to_motion(
             _add_noise(recent[k], spread[k], pooled, step[high], time[high], pos[high], legs, correlation, own, jump)
             for n in range(len(times)):
                 _add_slope(sums[k, n], time[high] - recent[k, 0, 1], times[n], pos[high], slope[high, n])
+            for d in range(2):
+                place[high, d] = sums[k, 0, 3 + d] / sums[k, 0, 0]
             recent[k, 1:] = recent[k, :-1].copy()
             recent[k, 0, 0], recent[k, 0, 1] = step[high], time[high]
             recent[k, 0, 2], recent[k, 0, 3] = pos[high, 0], pos[high, 1]

@@ -53,7 +53,7 @@ class PairBelief:
         fresh = np.flatnonzero(new[j])
         if len(fresh):
             # new people have no past: the evidence of this moment stands for all times
-            motion, means = self.motion.new(state[:, 2:]), PairMeans(len(fresh), self.seconds)
+            motion, means = self.motion.new(state[:, :2], state[:, 2:]), PairMeans(len(fresh), self.seconds)
             moment = pair_moment(state[:, :2], motion, i, j, others=self.others).rows(fresh)
             values = means.add(np.zeros(len(fresh), np.int64), np.arange(len(fresh)), moment)
             log_odds = default_belief().log_odds(values, moment.noise_level)[:, self.column]

@@ -150,18 +150,21 @@ def instant_evidence(pos: Array, motion: Motion, i: Ints, j: Ints, *, others: bo
         (apart * change).sum(axis=1) / np.maximum(distance, TOUCHING),
         np.where(both, np.arccos(np.clip(cosine, -1.0, 1.0)), np.nan),
         np.where(both, differ, np.nan), np.where(np.isfinite(differ), first != second, np.nan),
-        _file(pos, motion.slope[:, -1], i, j), *near,
+        _file(motion.place, motion.slope[:, -1], i, j), *near,
     ])  # fmt: skip
 
 
-def _file(pos: Array, way: Array, i: Ints, j: Ints) -> Array:
-    """Returns at how many ends of each pair others go on in file, (R,); way (N, 2): velocities, m/s."""
+def _file(place: Array, way: Array, i: Ints, j: Ints) -> Array:
+    """Returns at how many ends of each pair others go on in file, (R,).
+
+    place (N, 2): mean places, m, as errors bend a line of others; all lag alike. way (N, 2): velocities, m/s.
+    """
     from tracking.grouping.motion_kernels import file_ends
 
     one, other, out = np.concatenate([i, j]), np.concatenate([j, i]), np.empty(len(i))
     order = np.argsort(one, kind="stable")
-    begin = np.searchsorted(one[order], np.arange(len(pos) + 1))
-    file_ends(begin, other[order], pos, way, i, j, STANDING, FILE_SPACING, FILE_STRAIGHT, FILE_ALONG, out)
+    begin = np.searchsorted(one[order], np.arange(len(place) + 1))
+    file_ends(begin, other[order], place, way, i, j, STANDING, FILE_SPACING, FILE_STRAIGHT, FILE_ALONG, out)
     return out
 
 

@@ -60,11 +60,13 @@ def step_rows(frame: Ints, column: Ints, pos: Array, length: int, fps: float) ->
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
     """The motion of R people and steps: vel (R, 2), m/s, from a person's earliest position in the last 0.8 s to the
-    present one; slope (R, 2, 2), m/s, velocities by regression over the `TIMES`; noise (R, 3), m²: variances xx and yy
-    and covariance xy, in the order xx, xy, yy. Velocities are nan for a person without past."""
+    present one; slope (R, 2, 2), m/s, velocities by regression over the `TIMES`; place (R, 2), m, the mean over the
+    first of these; noise (R, 3), m²: variances xx and yy and covariance xy, in the order xx, xy, yy. Velocities are nan
+    for a person without past."""
 
     vel: Array
     slope: Array
+    place: Array
     noise: Array
 
 
@@ -87,15 +89,16 @@ class PersonMotion:
         from tracking.grouping.motion_kernels import add_to_motion
 
         n, settings = len(step), np.array([LEGS, CORRELATION, OWN, COMMON, JUMP])
-        vel, slope, noise = np.empty((n, 2)), np.empty((n, len(TIMES), 2)), np.empty((n, 3))
+        found = Motion(np.empty((n, 2)), np.empty((n, len(TIMES), 2)), np.empty((n, 2)), np.empty((n, 3)))
         state = self.recent, self.sums, self.spread, self.pooled
-        add_to_motion(step, person, pos, time, self.chord, np.array(TIMES), settings, *state, vel, slope, noise)
-        return Motion(vel, slope, noise)
+        out = found.vel, found.slope, found.place, found.noise
+        add_to_motion(step, person, pos, time, self.chord, np.array(TIMES), settings, *state, *out)
+        return found
 
-    def new(self, vel: Array) -> Motion:
-        """Returns the motion of N people who were not seen before, with velocities (N, 2), m/s."""
+    def new(self, pos: Array, vel: Array) -> Motion:
+        """Returns the motion of N people who were not seen before, at pos, vel (N, 2), m, m/s."""
         noise = np.broadcast_to(self.pooled[:3] / self.pooled[3], (len(vel), 3))
-        return Motion(vel, np.repeat(vel[:, None], len(TIMES), axis=1), noise)
+        return Motion(vel, np.repeat(vel[:, None], len(TIMES), axis=1), pos, noise)
 
     def take(self, rows: Ints) -> None:
         """Renumbers the people: person k becomes who was person rows[k], or somebody new if rows[k] is -1."""

@@ -42,7 +42,7 @@ def test_noise_of_one_person_is_told_from_that_of_all():
     step, column = np.divmod(np.arange(steps * 6), 6)
     noise = motion.add(step, column, error.reshape(-1, 2), step * 0.4).noise[-6:, 0]
     assert noise[5] > 10 * noise[:5].max()
-    late = motion.new(np.zeros((2, 2))).noise
+    late = motion.new(np.zeros((2, 2)), np.zeros((2, 2))).noise
     assert (late[0] == late[1]).all()
     assert noise[:5].max() < late[0, 0] < noise[5], "who is new has the noise of all"
 

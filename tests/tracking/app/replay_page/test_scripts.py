@@ -177,8 +177,8 @@ def test_words_about_groups_that_last() -> None:
     """Probability 0.2 and 0.45 at a threshold of 0.4: by the memory of the step before, or by others."""
     what = """[[0.2, true, true], [0.2, false, true], [0.1, true, true], [0.2, false, false], [0.45, false, false],
         [0.45, true, false], [0.55, false, false], [0.45, true, true]].map(
-        ([p, before, now]) => heldWords([0.25, 0.1], p, 0.4, before, now)
-    ).concat(heldWords(null, 0.2, 0.4, true, true))"""
+        ([p, before, now]) => heldWords([0.25, 0.1], p, 0.4, before, now)).concat(
+        heldWords(null, 0.2, 0.4, true, true))"""
     lasts = "In one group because they were a moment before: it lasts down to 15 %."
     others, apart = "In one group because of its other members.", "Not in one group because of others near them."
     comes = "Not yet in one group: to come into one takes more than 50 %."
