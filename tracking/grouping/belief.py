@@ -264,7 +264,7 @@ def pair_probabilities(table: TracksTable, fps: float, belief: Belief) -> PairPr
     """Returns the probability that two people belong together now, for all pairs less than 4 m apart in each frame.
 
     A pair's probability is computed once per step of at most 0.4 s and repeated in the frames of that step in which
-        both are reported. While one of the two is predicted only, it stays as it was. table: of people at the places from
+    both are reported. While one of the two is predicted only, it stays as it was. table: of people at the places from
     which groups are derived (`people_in_metres`).
     """
     found = beliefs_of_tracks(table.frame, table.column, table.pos, table.length, fps, belief, table.seen)
