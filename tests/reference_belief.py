@@ -182,7 +182,7 @@ def log_odds(belief, row):
     return found
 
 
-def groups(people, log_odds, unseen):
+def groups(people, log_odds, unseen, share):
     """Linkage of one step, one join at a time; log_odds: dict from (a, b), a < b."""
     parts = [frozenset([p]) for p in people]
     while True:
@@ -190,7 +190,7 @@ def groups(people, log_odds, unseen):
         for x, y in combinations(parts, 2):
             linked = {(p, q): log_odds.get((min(p, q), max(p, q)), unseen) for p in x for q in y}
             nearest = [max(linked[p, q] for q in y) for p in x] + [max(linked[p, q] for p in x) for q in y]
-            worth = (sum(linked.values()) / len(linked) + sum(nearest) / len(nearest)) / 2
+            worth = (1 - share) * sum(linked.values()) / len(linked) + share * sum(nearest) / len(nearest)
             if worth > 0 and (best is None or worth > best[0]):
                 best = worth, x, y
         if best is None:

@@ -63,7 +63,7 @@ class Belief:
     join: float = 0.1
     stay: float = 7.0
     come: float = 1.2
-    nearest: float = 0.5  # share of the nearest pairs, not all, in what two groups are worth together
+    nearest: float = 0.4  # share of the nearest pairs, not all, in what two groups are worth together
     memory: float = 1.0  # (s): a missed member stays so long in the group
 
     @property

@@ -1,9 +1,9 @@
 """Consistent groups from beliefs of pairs, by linkage.
 
-The two groups (or people) that are worth most together are joined, as long as that is above 0: half the mean over all
-their pairs, and half the mean over their people of the best pair with the other group. So a chain of strangers is no
-group, and a group whose ends are far apart is one. Groups of *now* take a pair's probability minus the
-belief's threshold, groups of *events* its log-odds; both with a memory of the step before.
+The two groups (or people) that are worth most together are joined, as long as that is above 0: the weighted mean of two
+means, over all their pairs, and over their people of the best pair with the other group. So a chain of strangers is no
+group, and a group whose ends are far apart is one. Groups of *now* take a pair's probability minus the belief's
+threshold, groups of *events* its log-odds; both with a memory of the step before.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ class StepGroups:
 
 def groups_of_steps(
     shape: tuple[int, int], step: Ints, a: Ints, b: Ints, values: Array, unseen: float, stay: float = 0.0,
-    come: float = 0.0, nearest: float = 0.5,
+    come: float = 0.0, nearest: float = 0.0,
 ) -> StepGroups:  # fmt: skip
     """Returns the groups of each step.
 
     step, a, b, values (R,): one row per pair (a, b) and step, step ascending; pairs without a row have the value
     `unseen`. stay is added to the value of a pair that was in one group in the step before, come is subtracted from
-    the value of any other pair. nearest: as of `Belief`.
+    the value of any other pair. nearest: weight of the best pairs.
     """
     from tracking.grouping.belief_kernels import linked_groups
 

@@ -30,8 +30,8 @@ def parts(label):
 
 
 @pytest.mark.parametrize("seed", range(4))
-@pytest.mark.parametrize(("stay", "come"), [(0.0, 0.0), (2.5, 1.5)])
-def test_groups_of_steps_are_linked_one_join_at_a_time(seed, stay, come):
+@pytest.mark.parametrize(("stay", "come", "nearest"), [(0.0, 0.0, 0.0), (2.5, 1.5, 0.0), (2.5, 1.5, 0.4)])
+def test_groups_of_steps_are_linked_one_join_at_a_time(seed, stay, come, nearest):
     """Of log-odds to which `stay` is added in groups of the step before, `come` taken elsewhere."""
     r = np.random.default_rng(seed)
     steps, people, unseen = 5, 9, -4.0
@@ -39,7 +39,7 @@ def test_groups_of_steps_are_linked_one_join_at_a_time(seed, stay, come):
     kept = (a < b) & (r.random(len(a)) < 0.7)
     step, a, b = step[kept], a[kept], b[kept]
     log_odds = r.normal(0.5, 3, len(a))
-    label = tabled(groups_of_steps((steps, people), step, a, b, log_odds, unseen, stay, come))
+    label = tabled(groups_of_steps((steps, people), step, a, b, log_odds, unseen, stay, come, nearest))
     before, differ = set(), 0
     for s in range(steps):
         known = {(i, j): x for q, i, j, x in zip(step, a, b, log_odds, strict=True) if q == s}
@@ -48,8 +48,8 @@ def test_groups_of_steps_are_linked_one_join_at_a_time(seed, stay, come):
             for i in range(people) for j in range(i + 1, people)
         }  # fmt: skip
         found = parts(label[s])
-        assert found == slow.groups(range(people), table, unseen)
-        differ += found != slow.groups(range(people), known, unseen)
+        assert found == slow.groups(range(people), table, unseen, nearest)
+        differ += found != slow.groups(range(people), known, unseen, nearest)
         before = found
     assert bool(differ) == bool(stay)
 
