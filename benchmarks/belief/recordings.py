@@ -14,13 +14,14 @@ from benchmarks.belief.pairs import f1, labelled, linked_pairs, pairs_in_frames,
 from benchmarks.support.options import HOTEL, WALK_TOGETHER, ZARA
 from benchmarks.support.tables import head, interval, number, row, signed
 from sim.types import Array, Bools, Ints, Truth
-from tracking.fitting.grouping_scenes import DETECTED, MISSED
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.link_rule import LinkRule
 from tracking.scoring.evaluation import evaluate
 from tracking.stats import block_intervals
+
+ERROR, MISSED = 0.1, 0.05  # m, share: of the rough positions
 
 
 def rough(truth: Truth, seed: int) -> Truth:
@@ -29,7 +30,7 @@ def rough(truth: Truth, seed: int) -> Truth:
     r = np.random.default_rng(seed)
     kept = r.random(len(truth.frame)) >= MISSED
     rows = {name: getattr(truth, name)[kept] for name in ("frame", "id", "group", "visibility")}
-    pos = (truth.pos + r.normal(0, DETECTED.sd, truth.pos.shape))[kept]
+    pos = (truth.pos + r.normal(0, ERROR, truth.pos.shape))[kept]
     return truth.replace(**rows, pos=pos, vel=None, box=None, truncation=None)
 
 
