@@ -111,7 +111,8 @@ class PersonMotion:
 
 
 def steady_places(frame: Ints, column: Ints, pos: Array, length: int, fps: float) -> Array:
-    """Returns where people are by a Kalman filter with their own noise, (R, 2), m: the same places if these are exact.
+    """Returns where people are by a Kalman filter with their own noise, (R, 2), m: soon the same places if they are
+    exact.
 
     frame, column (R,), from 0, pos (R, 2), m: one row per person and frame, sorted by frame. People walk at nearly
     constant velocity. Errors that are correlated over a time count as many times as often as they are alike.
@@ -122,14 +123,15 @@ def steady_places(frame: Ints, column: Ints, pos: Array, length: int, fps: float
     seen, people = step_rows(frame, column, pos, length, fps), int(column.max(initial=0)) + 1
     motion = PersonMotion(people, size / fps)
     variance = np.maximum(motion.add(seen.step, seen.column, seen.pos, seen.time).noise[:, [0, 2]], 0.0)
-    # of the last step that is over when the frame comes
-    key, wanted = seen.column * (length + 1) + seen.step, column * (length + 1) + (frame - 1) // size
-    row = np.searchsorted(key[np.lexsort((seen.step, seen.column))], wanted, side="right") - 1
-    order = np.lexsort((seen.step, seen.column))
-    known = (row >= 0) & (seen.column[order][row] == column)
-    sd, _ = FIRST
+    order, steps = np.lexsort((seen.step, seen.column)), -(-length // size)
+    # of the last step that is over when the frame comes: the person's own, else that of whoever was seen last
+    over = (frame - 1) // size
+    latest = np.searchsorted(seen.step, over, side="right") - 1
+    own = np.searchsorted((seen.column * steps + seen.step)[order], column * steps + over, side="right") - 1
+    known = (own >= 0) & (over >= 0) & (seen.column[order[own]] == column)
+    errors = np.where((latest >= 0)[:, None], variance[np.where(known, order[own], latest)], FIRST[0] ** 2)
     stay = np.exp(-1 / (fps * CORRELATION))
-    errors = np.where(known[:, None], variance[order][row], sd * sd) * (1 + stay) / (1 - stay)
+    errors *= (1 + stay) / (1 - stay)
     out, order = np.empty_like(pos), np.lexsort((frame, column))
     out[order] = filter_places(column[order], frame[order] / fps, pos[order], errors[order], STEADY)
     return out

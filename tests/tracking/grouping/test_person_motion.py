@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracking.grouping.person_motion import Motion, PersonMotion, step_rows
+from tracking.grouping.person_motion import Motion, PersonMotion, steady_places, step_rows
 
 
 def walkers(across: float, along: float, turn: float, fps: float = 2.5, people: int = 8, seconds: float = 30) -> Motion:
@@ -54,3 +54,39 @@ def test_velocities_by_regression_of_uniform_motion_are_exact():
     np.testing.assert_allclose(found.slope[1:], np.tile([1.25, -0.5], (11, 2, 1)), atol=1e-9)
     assert np.isnan(found.slope[0]).all()
     assert np.isnan(found.vel[0]).all()
+
+
+def walk(error: float, people: int = 4, seconds: int = 20, fps: float = 10.0):
+    """Frames, columns, true and measured places of people who walk at 1 m/s and err by white noise."""
+    frame, column = np.divmod(np.arange(int(seconds * fps) * people), people)
+    true = np.column_stack([frame / fps, 2.0 * column])
+    measured = true + np.random.default_rng(0).normal(0, error, true.shape)
+    return frame, column, true, measured, int(seconds * fps), fps
+
+
+def test_steady_places_are_nearer_the_truth_and_exact_ones_stay():
+    frame, column, true, measured, length, fps = walk(0.4)
+    late = frame > 30
+    found = steady_places(frame, column, measured, length, fps)
+    assert np.abs(found - true)[late].mean() < 0.4 * np.abs(measured - true)[late].mean()
+    frame, column, true, _, length, fps = walk(0.0)
+    exact = steady_places(frame, column, true, length, fps)
+    np.testing.assert_allclose(exact[frame > 20], true[frame > 20], atol=0.02)
+    np.testing.assert_allclose(exact[frame > 60], true[frame > 60], atol=1e-3)
+
+
+def test_steady_places_do_not_look_ahead():
+    frame, column, _, measured, length, fps = walk(0.4)
+    whole = steady_places(frame, column, measured, length, fps)
+    for until in (37, 90):
+        part = frame < until
+        found = steady_places(frame[part], column[part], measured[part], until, fps)
+        np.testing.assert_array_equal(found, whole[part])
+
+
+def test_who_comes_later_has_the_noise_of_those_before():
+    frame, column, _, measured, length, fps = walk(0.4)
+    late = (column < 3) | (frame > 100)
+    found = steady_places(frame[late], column[late], measured[late], length, fps)
+    new = (column[late] == 3) & (frame[late] == 102)
+    assert np.abs(found - measured[late])[new].max() > 0.05, "the second place counts little"
