@@ -123,13 +123,14 @@ def steady_places(frame: Ints, column: Ints, pos: Array, length: int, fps: float
     seen, people = step_rows(frame, column, pos, length, fps), int(column.max(initial=0)) + 1
     motion = PersonMotion(people, size / fps)
     variance = np.maximum(motion.add(seen.step, seen.column, seen.pos, seen.time).noise[:, [0, 2]], 0.0)
+    variance = np.concatenate([variance, np.full((1, 2), FIRST[0] ** 2)])
     order, steps = np.lexsort((seen.step, seen.column)), -(-length // size)
     # of the last step that is over when the frame comes: the person's own, else that of whoever was seen last
     over = (frame - 1) // size
-    latest = np.searchsorted(seen.step, over, side="right") - 1
     own = np.searchsorted((seen.column * steps + seen.step)[order], column * steps + over, side="right") - 1
-    known = (own >= 0) & (over >= 0) & (seen.column[order[own]] == column)
-    errors = np.where((latest >= 0)[:, None], variance[np.where(known, order[own], latest)], FIRST[0] ** 2)
+    known = (over >= 0) & (np.append(seen.column[order], -1)[own] == column)
+    latest = np.searchsorted(seen.step, over, side="right") - 1
+    errors = variance[np.where(known, np.append(order, -1)[own], latest)]
     stay = np.exp(-1 / (fps * CORRELATION))
     errors *= (1 + stay) / (1 - stay)
     out, order = np.empty_like(pos), np.lexsort((frame, column))

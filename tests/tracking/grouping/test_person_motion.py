@@ -90,3 +90,9 @@ def test_who_comes_later_has_the_noise_of_those_before():
     found = steady_places(frame[late], column[late], measured[late], length, fps)
     new = (column[late] == 3) & (frame[late] == 102)
     assert np.abs(found - measured[late])[new].max() > 0.05, "the second place counts little"
+
+
+def test_a_person_in_the_last_frames_alone_stays():
+    frame, pos = np.array([2]), np.array([[3.0, 4.0]])
+    np.testing.assert_array_equal(steady_places(frame, np.array([0]), pos, 3, 10.0), pos)
+    assert len(steady_places(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 2)), 3, 10.0)) == 0
