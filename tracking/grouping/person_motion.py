@@ -21,7 +21,7 @@ TIMES = (1.5, 4.0)  # s: in regressions, positions have weights exp(-age / time)
 # to 2 s); correlation time of the errors, s; time and number of deviations for which a person's own noise is told from
 # that of all, s; the longest deviation that counts, m.
 LEGS, CORRELATION, OWN, COMMON, JUMP = 0.18, 1.0, 20.0, 20.0, 4.0
-STEADY = 0.3  # m/s: by how much a walker's velocity changes in 1 s
+STEADY = 0.6  # m/s: by how much a walker's velocity changes in 1 s; 0.3 reports merges later
 FIRST = (0.1, 10.0)  # m: noise before anything was seen, with the weight of so many deviations.
 
 
