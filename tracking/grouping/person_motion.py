@@ -122,14 +122,15 @@ def steady_places(frame: Ints, column: Ints, pos: Array, length: int, fps: float
     seen, people = step_rows(frame, column, pos, length, fps), int(column.max(initial=0)) + 1
     motion = PersonMotion(people, size / fps)
     variance = np.maximum(motion.add(seen.step, seen.column, seen.pos, seen.time).noise[:, [0, 2]], 0.0)
-    # of the last step that is over when the frame comes
-    key, wanted = seen.column * (length + 1) + seen.step, column * (length + 1) + (frame - 1) // size
-    row = np.searchsorted(key[np.lexsort((seen.step, seen.column))], wanted, side="right") - 1
+    # of the last step that is over when the frame comes; the row after the last stands for a person without one
     order = np.lexsort((seen.step, seen.column))
-    known = (row >= 0) & (seen.column[order][row] == column)
+    key, wanted = (seen.column * (length + 1) + seen.step)[order], column * (length + 1) + (frame - 1) // size
+    row = np.searchsorted(key, wanted, side="right") - 1
+    known = np.append(seen.column[order], -1)[row] == column
     sd, _ = FIRST
     stay = np.exp(-1 / (fps * CORRELATION))
-    errors = np.where(known[:, None], variance[order][row], sd * sd) * (1 + stay) / (1 - stay)
+    variance = np.concatenate([variance[order], np.full((1, 2), sd * sd)])[np.where(known, row, len(order))]
+    errors = variance * (1 + stay) / (1 - stay)
     out, order = np.empty_like(pos), np.lexsort((frame, column))
     out[order] = filter_places(column[order], frame[order] / fps, pos[order], errors[order], STEADY)
     return out

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracking.grouping.person_motion import Motion, PersonMotion, step_rows
+from tracking.grouping.person_motion import Motion, PersonMotion, steady_places, step_rows
 
 
 def walkers(across: float, along: float, turn: float, fps: float = 2.5, people: int = 8, seconds: float = 30) -> Motion:
@@ -54,3 +54,10 @@ def test_velocities_by_regression_of_uniform_motion_are_exact():
     np.testing.assert_allclose(found.slope[1:], np.tile([1.25, -0.5], (11, 2, 1)), atol=1e-9)
     assert np.isnan(found.slope[0]).all()
     assert np.isnan(found.vel[0]).all()
+
+
+def test_places_without_any_complete_step_are_as_measured():
+    # at 30 frames/s step 1 ends with frame 12: two people who first come in frame 1, the last, are in no step
+    pos = np.array([[0.0, 0.0], [0.5, 0.0]])
+    found = steady_places(np.array([1, 1]), np.array([0, 1]), pos, 2, 30.0)
+    np.testing.assert_allclose(found, pos, atol=1e-12)
