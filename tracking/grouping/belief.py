@@ -37,6 +37,7 @@ KIND = "belief"
 UNSEEN = -4.0  # Belief about two people who are too far apart for a row: log-odds.
 DECISIONS = NOW, EVENTS = ("now", "events")  # Columns of a table.
 NUMBERS = ("share", "hold", "join", "stay", "come", "nearest", "memory")  # Numbers of `Belief` in its file.
+SHARES = {"share": (0.001, 0.999), **dict.fromkeys(("threshold", "hold", "join", "nearest"), (0.0, 1.0))}  # Bounds.
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -85,10 +86,13 @@ class Belief:
             _refuse(path, "grouping", "another file", f'grouping = "{KIND}" and at least one [[table]]')
         if content.keys() != keys:
             _refuse(path, min(content.keys() - keys, default="its keys"), sorted(content), ", ".join(sorted(keys)))
-        noise = _ascending(path, "noise", content.pop("noise"))
+        noise = _ascending(path, "noise", content.pop("noise"), low=0.0)
         bias = _matrix(path, "bias", content.pop("bias"), (len(DECISIONS), len(noise)))
-        threshold = _numbers(path, "threshold", content.pop("threshold"), len(noise), low=0.0)
-        numbers = {name: float(_numbers(path, name, [value], 1, low=0.0)[0]) for name, value in content.items()}
+        threshold = _numbers(path, "threshold", content.pop("threshold"), len(noise), *SHARES["threshold"])
+        numbers = {
+            name: float(_numbers(path, name, [value], 1, *SHARES.get(name, (0.0, math.inf)))[0])
+            for name, value in content.items()
+        }
         tables = tuple(_table(path, f"table {k}", row, len(noise)) for k, row in enumerate(rows, 1))
         return cls(tables, noise, bias, threshold, **numbers)
 
@@ -226,8 +230,8 @@ def _table(path: str | Path, place: str, row: Any, levels: int) -> Table:
     return Table(row["name"], at, np.array(heights))
 
 
-def _ascending(path: str | Path, place: str, values: Any) -> Array:
-    found = _numbers(path, place, values, len(values) if isinstance(values, list) else 1)
+def _ascending(path: str | Path, place: str, values: Any, low: float = -math.inf) -> Array:
+    found = _numbers(path, place, values, len(values) if isinstance(values, list) else 1, low)
     if len(found) < 2 or (np.diff(found) <= 0).any():
         _refuse(path, place, values, "two ascending numbers or more")
     return found
@@ -239,9 +243,13 @@ def _matrix(path: str | Path, place: str, rows: Any, shape: tuple[int, int]) -> 
     return np.array([_numbers(path, place, row, shape[1]) for row in rows])
 
 
-def _numbers(path: str | Path, place: str, values: Any, count: int, low: float = -math.inf) -> Array:
-    if not isinstance(values, list) or len(values) != count or not all(is_number(v, low, math.inf) for v in values):
-        _refuse(path, place, values, f"numbers ({count})" + (f" of {low:g} or above" if low == 0 else ""))
+def _numbers(
+    path: str | Path, place: str, values: Any, count: int, low: float = -math.inf, high: float = math.inf
+) -> Array:
+    if not isinstance(values, list) or len(values) != count or not all(is_number(v, low, high) for v in values):
+        above = f" of {low:g} or above" if math.isfinite(low) else ""
+        bounds = f" from {low:g} to {high:g}" if math.isfinite(high) else above
+        _refuse(path, place, values, f"numbers ({count}){bounds}")
     return np.array(values, float)
 
 

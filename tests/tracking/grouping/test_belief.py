@@ -92,11 +92,16 @@ BAD_FILES = [
     ("at = [", "at = [9, ", "table 1: at"),
     ("at = [", "at = [-1, ", "table 1: now"),
     ("threshold = [", "threshold = [0.5, ", "threshold"),
-    ("noise = [", "noise = [-1, ", "bias"),
+    ("noise = [0.0", "noise = [0.0, 0.05", "bias"),
     ("at = [", "at = [[1], [2, 3], ", "table 1: at"),
     ("events = [", 'events = ["x", ', "table 1: events"),
     ("events = [", "change = [", "table 1"),
     ("[[table]]", "[[row]]", "grouping"),
+    ("share = 0.18", "share = 0.0", "share"),
+    ("share = 0.18", "share = 1.0", "share"),
+    ("nearest = ", "nearest = 1", "nearest"),
+    ("threshold = [0.", "threshold = [2.", "threshold"),
+    ("noise = [0.0", "noise = [-0.1", "noise"),
 ]
 
 

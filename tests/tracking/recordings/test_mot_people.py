@@ -194,6 +194,15 @@ def test_positions_alone_are_in_metres_or_refused(tmp_path, unit, header):
             read()
 
 
+def test_positions_that_err_are_in_metres(tmp_path):
+    # errors of 0.5 m at 30 frames/s: 27 m/s from frame to frame, 3 m/s over 0.5 s
+    path, rng = tmp_path / "walk.csv", np.random.default_rng(0)
+    pos = np.arange(90)[:, None, None] * [1.3 / 30, 0.0] + [[0.0, 0.0], [0.0, 1.0]] + rng.normal(0, 0.5, (90, 2, 2))
+    rows = [f"{f + 1},{k + 1},{x:.3f},{y:.3f}" for f, both in enumerate(pos) for k, (x, y) in enumerate(both)]
+    path.write_text("\n".join(rows))
+    assert len(open_source(path, fps=30)[0].truth.id) == 180
+
+
 def test_labels_without_ids_are_an_error(tmp_path):
     mot_folder(tmp_path, f"1,-1,{BOX},1,1,1\n")
     with pytest.raises(InputError, match="negative ids in all 1 rows"):

@@ -96,7 +96,8 @@ def _adapt_grouping(options: FitGroupingOptions) -> CommandResult:
     for name in options.names:
         for sequence, stored in zip(*opened_people(options, Path(name)), strict=True):
             run = None if stored is None else stored.read(sequence)
-            recordings[sequence.name] = explained_people(sequence, run, before)
+            again = f", recording {len(recordings) + 1}" if sequence.name in recordings else ""
+            recordings[sequence.name + again] = explained_people(sequence, run, before)
     found = adapt(answered_rows(files, recordings))
     belief, (bias, near, motion) = found.belief, found.theta.tolist()
     asked = [word for path in options.labels for word in ("--labels", str(path))]

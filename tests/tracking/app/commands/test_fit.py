@@ -18,6 +18,7 @@ from tests.refusals import answer, refused
 from tracking.app.cli import run
 from tracking.grouping.belief import Belief, default_belief
 from tracking.recordings.source import open_source
+from tracking.running.explained_people import explained_people
 
 
 @pytest.fixture(scope="module")
@@ -114,6 +115,20 @@ def test_answers_about_boxes_before_a_camera_fit_their_run(capsys: pytest.Captur
     line = ["fit", "grouping", "--labels", file, tmp_path / "run", "--out", tmp_path / "mine.toml", *options]
     assert answer(capsys, *line)["fitted"]["answers"] == 1
     assert "--camera" in refused(capsys, *line[:-2])
+
+
+def test_answers_fit_one_of_two_recordings_of_a_name(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    texts = [tmp_path / folder / "walk.csv" for folder in ("first", "second")]
+    for text, apart in zip(texts, (0.7, 0.9), strict=True):
+        text.parent.mkdir()
+        text.write_text("\n".join(f"{f},{k},{0.13 * f:.2f},{apart * k:.2f}" for f in range(1, 60) for k in (1, 2)))
+    people = explained_people(open_source(texts[0], fps=10)[0], None, default_belief()).people
+    said = [{"a": 1, "b": 2, "from": 0.0, "to": 4.0, "answer": "together"}]
+    head = {"format": 1, "kind": "pair labels", "recording": "walk", "frames": 59}
+    file = tmp_path / "answers.json"
+    file.write_text(json.dumps({**head, "people": people, "answers": said}))
+    line = ["fit", "grouping", "--labels", file, *texts, "--fps", "10", "--out", tmp_path / "mine.toml"]
+    assert answer(capsys, *line)["fitted"]["answers"] == 1
 
 
 def test_wrong_labels_are_refused(made: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
