@@ -86,13 +86,14 @@ def _adapt_grouping(options: FitGroupingOptions) -> CommandResult:
     from tracking.fitting.pair_answers import AnswerFile, answered_rows
     from tracking.fitting.place_belief import adapt
     from tracking.grouping.belief import default_belief
+    from tracking.grouping.explained_pairs import ExplainedPairs
     from tracking.running.explained_people import explained_people
 
     if options.events:
         remedy = "leave --events out: answers tell nothing about events"
         raise InputError(place="--events", got="it with --labels", expected="one of the two", remedy=remedy)
     out, files = output_file(options.out, ".toml"), [AnswerFile.read(path) for path in options.labels]
-    recordings, before = {}, default_belief()
+    recordings, before = dict[str, ExplainedPairs](), default_belief()
     for name in options.names:
         for sequence, stored in zip(*opened_people(options, Path(name)), strict=True):
             run = None if stored is None else stored.read(sequence)
