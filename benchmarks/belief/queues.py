@@ -1,7 +1,7 @@
 """Mode `queues` of `benchmarks.belief`: strangers who stand or walk close to each other in lines and crowds.
 
-Scenes: `queue` of the suite standard, and the suite `lines` where the catalogue has it, else its scenarios that are
-there. Ids are known, positions exact or with errors as in mode `noise`, m across and along the line of sight.
+Scenes: those of the suite `lines`. Ids are known, positions exact or with errors as in mode `noise`, m across and along
+the line of sight.
 false: pairs reported in one group who are in no true group together, in pair-minutes for each minute that a person is
 seen. precision, recall: of pairs of one frame. in queues: share of the true pairs found among people who both queue.
 Means over sequences with 95 % intervals; differences are paired.
@@ -9,7 +9,7 @@ Means over sequences with 95 % intervals; differences are paired.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 
 import numpy as np
 
@@ -17,32 +17,22 @@ from benchmarks.belief.errors import SIZES, with_errors
 from benchmarks.belief.pairs import linked_pairs, pairs_in_frames
 from benchmarks.support.options import seeds_text
 from benchmarks.support.tables import difference_cell, mean_cell, table
-from scenarios.loading.resolve import Entry, names, resolve, suite_names
+from scenarios.loading.resolve import resolve
 from sim.sequence import simulate
 from sim.types import Array, Bools, Ints, Truth
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouping_choice import Grouping
 from tracking.grouping.link_rule import LinkRule
 
-OF_STANDARD = ("queue", "queue-dense")
-LINES, SCENARIOS = "lines", ("waiting", "crossing-lights", "single-file")
 COLUMNS = ("false", "precision", "recall", "in queues")
 OF = ("", "pairwise_precision", "pairwise_recall", "pairwise_recall")  # scores at whose range intervals are cut
-
-
-def scenes() -> Iterator[Entry]:
-    """Yields the scenes that the catalogue has."""
-    yield from (entry for entry in resolve("standard") if entry.name in OF_STANDARD)
-    there = [f"suite:{LINES}"] if LINES in suite_names() else [name for name in SCENARIOS if name in names()]
-    for name in there:
-        yield from resolve(name)
 
 
 def queues(seeds: range, belief: Belief, before: Belief | None) -> None:
     """Prints a table for each scene."""
     groupings: dict[str, Grouping] = {"rule": LinkRule(), "belief": belief, **({"before": before} if before else {})}
     print("false: pair-minutes for each person-minute")
-    for entry in scenes():
+    for entry in resolve("lines"):
         truths: list[Truth] = [simulate(entry.scenario, seed, entry.repeat, streams=()).truth for seed in seeds]
         rows: dict[str, list[str]] = {}
         for errors in SIZES[:3]:

@@ -36,10 +36,3 @@ def test_scores_of_pairs(monkeypatch):
     assert precision == 5 / 15
     assert recall == 5 / 20
     assert found == pytest.approx(2 / 3)  # 1 and 2 in the frames 4 and 5 of 4 to 6
-
-
-def test_scenes_are_those_of_the_catalogue(monkeypatch):
-    monkeypatch.setattr(queues, "suite_names", lambda: ["standard"])
-    monkeypatch.setattr(queues, "names", lambda: ["queue", "door"])
-    monkeypatch.setattr(queues, "SCENARIOS", ("door", "absent"))
-    assert [entry.name for entry in queues.scenes()] == ["queue", "queue-dense", "door"]
