@@ -87,7 +87,7 @@ def completed(
     ground = ground_below(tracks, camera, px_per_m, source, image_size)
     if ground.camera is None:
         return with_groups(tracks, fps, px_per_m, rule, objective=objective), ground
-    places = _places(tracks, ground.camera, scene if camera is not None else None)
+    places = _places(tracks, ground, scene)
     _, labels, events = labels_and_events(tracks, fps, 1.0, rule, objective=objective, places=places)
     there = [moved_events(new, t.id, t.pos) for t, new in zip(tracks, events, strict=True)]
     return tuple(filled(with_velocities(tracks, fps), labels, there, objective=objective)), ground
@@ -101,13 +101,14 @@ def people_in_metres(
     ground = ground_below(tracks, camera, px_per_m, source, image_size)
     if ground.camera is None:
         return tabulate(tracks, fps, px_per_m)
-    return tabulate(tracks, fps, 1.0, _places(tracks, ground.camera, scene if camera is not None else None))
+    return tabulate(tracks, fps, 1.0, _places(tracks, ground, scene))
 
 
-def _places(tracks: Sequence[Tracks], ground: Camera, scene: Scene | None) -> Array:
-    """Returns the ground points (R, 2), m, of all rows. scene: None if only boxes show the ground, as these tell no
-    place in the scene."""
-    return standing_points(_boxes(tracks), ground, scene)
+def _places(tracks: Sequence[Tracks], ground: Ground, scene: Scene | None) -> Array:
+    """Returns the points on a known ground (R, 2), m, of all rows. Boxes that show the ground tell no place in the
+    scene."""
+    assert ground.camera is not None
+    return standing_points(_boxes(tracks), ground.camera, scene if ground.source == "camera" else None)
 
 
 def _boxes(tracks: Sequence[Tracks]) -> Array:

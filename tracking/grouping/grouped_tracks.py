@@ -131,8 +131,10 @@ def labels_and_events(
         # groups that appear later would change frames that are reported already
         tracks = [t.replace(group=np.full(len(t.id), -1), groups=None) if _has_groups(t) else t for t in tracks]
     table, events = tabulate(tracks, fps, px_per_m, places), list[GroupEvent]()
-    steady = _steady(table, fps) if isinstance(rule, Belief) else table
-    if not named or own.get("merge", math.inf) > 1:
+    changes = not named or own.get("merge", math.inf) > 1
+    # what a tracker reports itself, and the objective leaves out, needs no places
+    steady = _steady(table, fps) if isinstance(rule, Belief) and (changes or not objective) else table
+    if changes:
         group, events = _grouped(table, steady, named, fps, rule)
         table, steady = replace(table, group=group), replace(steady, group=group)
     events += [] if objective else _crossings_and_queues(steady, fps)

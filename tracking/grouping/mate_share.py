@@ -14,19 +14,19 @@ import numpy as np
 from sim.types import Array, Ints
 
 WEIGHT = 30.0  # Pairs.
-LOWEST, WIDTH, BINS = -12.0, 0.25, 81  # Log-odds: first bin, width and number of bins.
+MIDDLES = -12.0 + 0.25 * np.arange(81, dtype=np.float64)  # Log-odds in the middles of the bins.
 
 
 class MateShare:
     """The shift of log-odds that the share of mates among the pairs so far asks for. share: that of the fit.
 
-    State: latest (K,), bin of each pair's latest belief, -1 for none; counts (BINS,), pairs by bin, those who are gone
+    State: latest (K,), bin of each pair's latest belief, -1 for none; counts (B,), pairs by bin, those who are gone
     included; shift (1,), log-odds.
     """
 
     def __init__(self, share: float) -> None:
         self.share = share
-        self.latest, self.counts, self.shift = np.zeros(0, np.int64), np.zeros(BINS), np.zeros(1)
+        self.latest, self.counts, self.shift = np.zeros(0, np.int64), np.zeros(len(MIDDLES)), np.zeros(1)
 
     def add(self, step: Ints, pair: Ints, log_odds: Array) -> Array:
         """Adds beliefs (R,), steps ascending, of pairs (R,), numbers from 0. Returns the shift (R,) at each step."""
@@ -35,8 +35,7 @@ class MateShare:
         more, out = int(pair.max(initial=-1)) + 1 - len(self.latest), np.empty(len(step))
         if more > 0:
             self.latest = np.concatenate([self.latest, np.full(more, -1)])
-        middle = LOWEST + WIDTH * np.arange(BINS, dtype=np.float64)
-        shifts_of_share(step, pair, log_odds, middle, self.share, WEIGHT, self.latest, self.counts, self.shift, out)
+        shifts_of_share(step, pair, log_odds, MIDDLES, self.share, WEIGHT, self.latest, self.counts, self.shift, out)
         return out
 
     def take(self, rows: Ints) -> None:
