@@ -21,7 +21,8 @@ from benchmarks.support.timing import best_times, machine_load
 from scenarios.loading.resolve import resolve
 from sim.sequence import simulate
 from sim.types import Array, Truth
-from tracking.grouping.belief import Belief, pair_probabilities
+from tracking.grouping.belief import Belief
+from tracking.grouping.pair_beliefs import pair_probabilities
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.online_belief import PairBelief

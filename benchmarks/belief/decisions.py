@@ -21,7 +21,8 @@ from scenarios.loading.resolve import resolve
 from sim.types import Bools, Ints, Truth
 from tracking.fitting.grouping_scenes import simulated
 from tracking.grouping import grouping_choice
-from tracking.grouping.belief import Belief, pair_probabilities
+from tracking.grouping.belief import Belief
+from tracking.grouping.pair_beliefs import pair_probabilities
 from tracking.grouping.belief_groups import FoundGroups, belief_groups
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.tracks_table import tabulate

@@ -8,7 +8,9 @@ frames of events count from 1.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
+from dataclasses import replace
+from typing import Protocol
 
 import numpy as np
 
@@ -25,6 +27,14 @@ CROSS_VELOCITY = 0.6  # m/s: least difference of the mean velocities over the en
 SAME_BEFORE = 2.0  # s before and after the encounter in which the members stay the same
 
 
+class Moments(Protocol):
+    """The motion of people by number, as `MotionRows`."""
+
+    def window(self, columns: Sequence[int], first: int, end: int) -> tuple[Array, Array, Ints]:
+        """Returns positions, velocities (N, K, 2) and groups (N, K) of K people in the frames first … end - 1; nan and
+        -1 where a person is absent."""
+
+
 def crossings(motion: MotionRows, fps: float) -> list[GroupEvent]:
     """Returns a cross event for each crossing of two groups of two or more people, in order of time.
 
@@ -33,29 +43,90 @@ def crossings(motion: MotionRows, fps: float) -> list[GroupEvent]:
     change sides. From 2 s before to 2 s after the encounter both keep their members, except for members who leave the
     scene.
     """
-    margin, people = frames_of(SAME_BEFORE, fps), dict[int, set[int]]()
-    width = int(motion.column.max(initial=0)) + 1
-    for key in np.unique(motion.group * width + motion.column).tolist():
-        people.setdefault(key // width, set()).add(key % width)
-    met = (
-        _crossed(motion, sorted(people[a] | people[b]), first, last, a, b, margin)
-        for first, last, a, b in encounters(motion, fps)
-    )
-    return [event for event in met if event is not None]
+    finder, rows = CrossingFinder(fps), (motion.frame, motion.column, motion.pos, motion.group)
+    found = [*finder.add(*rows, motion, motion.length), *finder.rest(motion)]
+    found = [replace(e, members=tuple(p + 1 for p in e.members)) for e in found]
+    return sorted(found, key=lambda e: (e.start, e.end, e.before))
 
 
-def encounters(motion: MotionRows, fps: float) -> list[tuple[int, int, int, int]]:
-    """Returns (first frame, last frame, id a, id b) of each encounter of two groups; frames from 0, a < b, sorted."""
-    t, label = motion.frame, motion.group
-    rows, start = member_rows(t, motion.column, label)
+class CrossingFinder:
+    """Finds crossings in frames that are added one after another; it does not matter how many at once.
+
+    State: end, number of frames so far; people, who was ever in each group, by id of the group; open, first and last
+    frame of the encounters that may go on or are not known yet, by the ids of both groups, in order of time.
+    """
+
+    def __init__(self, fps: float) -> None:
+        self.margin, self.bridge = frames_of(SAME_BEFORE, fps), frames_of(BRIDGE_TIME, fps)
+        self.end, self.people = 0, dict[int, set[int]]()
+        self.open: dict[tuple[int, int], list[list[int]]] = {}
+
+    def add(self, frame: Ints, id: Ints, pos: Array, group: Ints, motion: Moments, end: int) -> list[GroupEvent]:
+        """Adds the frames up to `end`, and returns the crossings that are known now, in order of time; `emitted` is
+        None.
+
+        frame, from 0, id, group (R,), pos (R, 2), m: one row per person and frame. motion: of these frames and of those
+        before, back to `first`.
+        """
+        grouped = np.flatnonzero((group >= 0) & np.isfinite(pos).all(axis=1))
+        frame, id, pos, group = frame[grouped], id[grouped], pos[grouped], group[grouped]
+        for name, person in np.unique(np.column_stack([group, id]), axis=0).tolist():
+            self.people.setdefault(name, set()).add(person)
+        for first, last, a, b in encounters(frame, id, pos, group, self.bridge):
+            known = self.open.setdefault((a, b), [])
+            if known and first - known[-1][1] <= self.bridge:
+                known[-1][1] = last
+            else:
+                known.append([first, last])
+        self.end = end
+        return self._crossed(motion, end)
+
+    def rest(self, motion: Moments) -> list[GroupEvent]:
+        """Returns the crossings that are not known yet when the recording ends."""
+        return self._crossed(motion, self.end + self.margin + 1)
+
+    @property
+    def first(self) -> int:
+        """The first frame whose motion is needed still."""
+        begun = [met[0][0] for met in self.open.values()]
+        return max(0, min([self.end, *begun]) - self.margin - 1)
+
+    def forget(self, groups: Set[int]) -> None:
+        """Forgets the people of all groups but these and those that meet."""
+        kept = groups | {g for pair in self.open for g in pair}
+        self.people = {g: people for g, people in self.people.items() if g in kept}
+
+    def _crossed(self, motion: Moments, end: int) -> list[GroupEvent]:
+        """Removes the encounters that are known before frame `end`, and returns those that are crossings."""
+        found = []
+        for (a, b), met in list(self.open.items()):
+            over = [k for k in met if k[1] + self.margin < end]
+            self.open[a, b] = met[len(over) :]
+            if not self.open[a, b]:
+                del self.open[a, b]
+            found += [(first, last, a, b) for first, last in over]
+        events = (
+            _crossed(motion, sorted(self.people[a] | self.people[b]), first, last, a, b, self.margin, self.end)
+            for first, last, a, b in sorted(found)
+        )
+        return [event for event in events if event is not None]
+
+
+def encounters(frame: Ints, id: Ints, pos: Array, group: Ints, bridge: int) -> list[tuple[int, int, int, int]]:
+    """Returns (first frame, last frame, id a, id b) of each encounter of two groups; frames from 0, a < b, sorted.
+
+    frame, id, group (R,), pos (R, 2), m: one row per person and frame. bridge: longest step from one frame of an
+    encounter to the next.
+    """
+    rows, start = member_rows(frame, id, group)
     if not len(start):
         return []
-    frame = t[rows][start]
-    names, name = np.unique(label[rows][start], return_inverse=True)  # ids may be too large for their products
-    i, j = _within_reach(frame, motion.pos[rows], start)
-    pair, when = name[i] * len(names) + name[j], frame[i]  # sorted by group within a frame: name[i] < name[j]
+    t = frame[rows][start]
+    names, name = np.unique(group[rows][start], return_inverse=True)  # ids may be too large for their products
+    i, j = _within_reach(t, pos[rows], start)
+    pair, when = name[i] * len(names) + name[j], t[i]  # sorted by group within a frame: name[i] < name[j]
     order = np.lexsort((when, pair))
-    pair, first, last = stretches(pair[order], when[order], 1, frames_of(BRIDGE_TIME, fps))
+    pair, first, last = stretches(pair[order], when[order], 1, bridge)
     ids = (names[k] for k in divmod(pair, len(names)))
     return sorted(zip(*(x.tolist() for x in (first, last, *ids)), strict=True))
 
@@ -79,14 +150,14 @@ def _within_reach(t: Ints, places: Array, start: Ints) -> tuple[Ints, Ints]:
 
 
 def _crossed(
-    motion: MotionRows, people: Sequence[int], first: int, last: int, a: int, b: int, margin: int
+    motion: Moments, people: Sequence[int], first: int, last: int, a: int, b: int, margin: int, end: int
 ) -> GroupEvent | None:
     """Returns the event of one encounter of groups a and b, from frame `first` to `last` (from 0); None: no crossing.
 
-    people: all who are ever in group a or b. margin: frames of SAME_BEFORE.
+    people: all who are ever in group a or b. margin: frames of SAME_BEFORE. end: frames so far.
     """
     begin = max(first - margin, 0)
-    pos, vel, group = motion.window(people, begin, min(last + margin + 1, motion.length))
+    pos, vel, group = motion.window(people, begin, min(last + margin + 1, end))
     members = [np.flatnonzero(group[first - begin] == name) for name in (a, b)]
     if not all(_same_members(pos, group, g, who) for g, who in zip((a, b), members, strict=True)):
         return None
@@ -103,7 +174,7 @@ def _crossed(
         return None
     k = during.start + int(np.nanargmin(length(apart[during])))
     x, y = (path[k] + other[k]) / 2
-    crossed = tuple(people[p] + 1 for p in sorted(np.concatenate(members).tolist()))
+    crossed = tuple(people[p] for p in sorted(np.concatenate(members).tolist()))
     return GroupEvent("cross", first + 1, last + 1, None, (a, b), (a, b), crossed, (float(x), float(y)))
 
 

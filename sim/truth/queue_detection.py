@@ -13,7 +13,7 @@ the third. All moments are handled at once. Tables of positions (M, n, 2) hold M
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
@@ -168,10 +168,11 @@ class _LineNow:
     """A line of waiting people in one moment; vectors are complex numbers."""
 
     t: int  # frame, from 0
-    order: tuple[int, ...]  # columns (person id - 1) from one end to the other
+    order: tuple[int, ...]  # people from one end to the other
     u: complex  # unit vector from the first person towards the last
     middle: complex  # their mean position, m
     drift: complex  # their mean velocity along u, and to the left of u (imaginary part), m/s
+    there: tuple[Ints, Ints]  # who is there, ascending, and in which groups
 
     def turned(self) -> _LineNow:
         """Returns the same line with its ends exchanged."""
@@ -180,44 +181,107 @@ class _LineNow:
 
 @dataclass
 class _FollowedLine:
-    """A line of waiting people that is followed through time; frames from 0, people are columns."""
+    """A line of waiting people that is followed through time; frames from 0."""
 
     now: _LineNow  # the line when last seen
     since: int  # first and last frame with at least 3 people (QUEUE_PEOPLE)
     three: int
     middle: complex  # of the line in the frame in which following began, m
+    there: tuple[Ints, Ints]  # as of the line in the frame `since`
     seen: Counter[int]  # by person, number of moments (examined frames) in the line
     drift: complex = 0.0  # sum over `moments` moments of the line's drift
     moments: int = 0
 
 
 def queues(motion: MotionRows, fps: float) -> list[GroupEvent]:
-    """Returns a queue event for each queue, in order of first and last frame.
+    """Returns a queue event for each queue, in order of first and last frame; people are columns + 1.
 
     A queue is a line (see `queue_shapes`) of waiting people that has at least 3 people for 3 s; it may be lost for up
     to 1.5 s. A line that moves sideways is no queue. The event starts in the first frame with 3 people and ends in the
     last frame with 2 in line. Its members are all people who were in the line for at least 1 s. Its position is the
     middle of the line when it was first found. About 10 frames per s are examined.
     """
-    stride = max(1, round(fps / MAX_RATE))
-    hold, bridge = frames_of(QUEUE_TIME, fps), max(frames_of(BRIDGE_TIME, fps), stride)
-    following: list[_FollowedLine] = []
-    ended: list[_FollowedLine] = []
-    for t, moments in groupby(_lines(motion, waiting_people(motion, fps), stride), key=lambda m: m.t):
-        ended += [f for f in following if t - f.now.t > bridge]
-        following = [f for f in following if t - f.now.t <= bridge]
-        for moment in moments:
-            _follow(following, moment, hold, bridge)
-    found = []
-    for f in ended + following:
-        columns = np.array(sorted(p for p, n in f.seen.items() if n * stride >= MEMBER_TIME * fps), np.int64)
-        along, aside = abs(f.drift.real) / f.moments, abs(f.drift.imag) / f.moments
-        sideways = aside > SIDEWAYS_SPEED and aside > along
-        if len(columns) and f.three - f.since + stride >= hold and not sideways:
-            before, after = (_groups_of(motion.group[motion.rows_at(columns, t)]) for t in (f.since, f.now.t))
-            people, place = tuple((columns + 1).tolist()), (f.middle.real, f.middle.imag)
-            found.append(GroupEvent("queue", f.since + 1, f.now.t + 1, None, before, after, people, place))
+    finder, rows = QueueFinder(fps), (motion.frame, motion.column, motion.pos, motion.vel, motion.group)
+    found = [*finder.add(*rows, motion.length), *finder.rest()]
+    found = [replace(e, members=tuple(p + 1 for p in e.members)) for e in found]
     return sorted(found, key=lambda e: (e.start, e.end, e.members))
+
+
+class QueueFinder:
+    """Finds queues in frames that are added one after another; it does not matter how many at once.
+
+    State: following, the lines that may go on; rows (frame, id, pos, vel, group) of the frames in which it is not known
+    yet who waits; slow, the last frame in which each person was slow; end, number of frames so far; done, of those in
+    which it is known who waits.
+    """
+
+    def __init__(self, fps: float) -> None:
+        self.fps, self.stride = fps, max(1, round(fps / MAX_RATE))
+        self.hold, self.bridge = frames_of(QUEUE_TIME, fps), max(frames_of(BRIDGE_TIME, fps), self.stride)
+        self.end = self.done = 0
+        self.following, self.slow = list[_FollowedLine](), dict[int, int]()
+        nobody, nowhere = np.zeros(0, np.int64), np.zeros((0, 2))
+        self.rows: tuple[Array, ...] = (nobody, nobody, nowhere, nowhere, nobody)
+
+    def add(self, frame: Ints, id: Ints, pos: Array, vel: Array, group: Ints, end: int) -> list[GroupEvent]:
+        """Adds the frames up to `end`, and returns the queues that are known to be over; `emitted` is None.
+
+        frame, from 0, id, group (R,), pos, vel (R, 2), m, m/s: one row per person and frame.
+        """
+        new, self.end = (frame, id, pos, vel, group), end
+        self.rows = tuple(np.concatenate(pair) for pair in zip(self.rows, new, strict=True))
+        return self._look(end - frames_of(ADVANCE_TIME, self.fps))
+
+    def rest(self) -> list[GroupEvent]:
+        """Returns the queues that are not known to be over when the recording ends."""
+        found = self._look(self.end)
+        found += self._ended(self.following)
+        self.following = []
+        return found
+
+    def forget(self, before: int) -> None:
+        """Forgets who was slow before a frame."""
+        self.slow = {p: t for p, t in self.slow.items() if t >= before}
+
+    def _look(self, until: int) -> list[GroupEvent]:
+        """Follows the lines of the frames before `until`, and keeps the other rows. Returns the queues that ended."""
+        if until <= self.done:
+            return []
+        frame, id, pos, vel, group = self.rows
+        ids, column = np.unique(id, return_inverse=True)
+        rows = MotionRows.of(frame, column, pos, vel, group, self.end)
+        known = rows.frame < until
+        waits = waiting_people(rows, self.fps, np.array([self.slow.get(p, -1) for p in ids.tolist()], np.int64))
+        lines, ended = _lines(rows, waits & known, self.stride, ids), list[_FollowedLine]()
+        for t, moments in groupby(lines, key=lambda m: m.t):
+            ended += self._over(t - 1)
+            for moment in moments:
+                _follow(self.following, moment, self.hold, self.bridge)
+        ended += self._over(until - 1)
+        slow = known & (length(rows.vel) < WAITING_SPEED)
+        self.slow |= dict(zip(ids[rows.column[slow]].tolist(), rows.frame[slow].tolist(), strict=True))
+        self.rows, self.done = tuple(x[frame >= until] for x in self.rows), until
+        return self._ended(ended)
+
+    def _over(self, t: int) -> list[_FollowedLine]:
+        """Removes and returns the lines that cannot go on after frame t."""
+        over = [f for f in self.following if t >= f.now.t + self.bridge]
+        self.following = [f for f in self.following if t < f.now.t + self.bridge]
+        return over
+
+    def _ended(self, lines: Sequence[_FollowedLine]) -> list[GroupEvent]:
+        found = []
+        for f in lines:
+            people = sorted(p for p, n in f.seen.items() if n * self.stride >= MEMBER_TIME * self.fps)
+            along, aside = abs(f.drift.real) / f.moments, abs(f.drift.imag) / f.moments
+            sideways = aside > SIDEWAYS_SPEED and aside > along
+            if people and f.three - f.since + self.stride >= self.hold and not sideways:
+                before, after = (_groups_of(people, there) for there in (f.there, f.now.there))
+                place = f.middle.real, f.middle.imag
+                found.append(
+                    GroupEvent("queue", f.since + 1, f.now.t + 1, None, before, after, tuple(people), place)
+                )
+        return found
 
 
 def longest_line(motion: MotionRows, fps: float) -> tuple[int, float]:
@@ -235,28 +299,44 @@ def longest_line(motion: MotionRows, fps: float) -> tuple[int, float]:
     return 0, 0.0
 
 
-def _groups_of(label: Ints) -> tuple[int, ...]:
-    """Returns the ids of the groups among labels (K,), after -1 once for each person alone."""
+def _groups_of(people: Sequence[int], there: tuple[Ints, Ints]) -> tuple[int, ...]:
+    """Returns the ids of the groups of those people who are there, after -1 once for each person alone."""
+    label = there[1][np.isin(there[0], people)]
     return (-1,) * int((label < 0).sum()) + tuple(np.unique(label[label >= 0]).tolist())
 
 
-def waiting_people(motion: MotionRows, fps: float) -> Bools:
+def waiting_people(motion: MotionRows, fps: float, slow_before: Ints | None = None) -> Bools:
     """Returns flags (R,): True where a person waits.
 
-    These are people slower than 0.4 m/s, and people who move for at most 3 s between two such waits.
+    These are people slower than 0.4 m/s, and people who move for at most 3 s between two such waits. slow_before (K,):
+    the last frame before these rows in which each person was that slow, -1 for none; None: nobody was.
     """
     slow = length(motion.vel) < WAITING_SPEED
-    person, first, last = stretches(motion.column[slow], motion.frame[slow], 1, frames_of(ADVANCE_TIME, fps))
+    column, frame = motion.column[slow], motion.frame[slow]
+    if slow_before is not None:
+        before = np.flatnonzero(slow_before >= 0)
+        column, frame = np.concatenate([before, column]), np.concatenate([slow_before[before], frame])
+        order = np.lexsort((frame, column))
+        column, frame = column[order], frame[order]
+    person, first, last = stretches(column, frame, 1, frames_of(ADVANCE_TIME, fps))
     out = np.zeros(len(slow) + 1, np.int64)
-    out[motion.find(person, first)] += 1
-    out[motion.find(person, last) + 1] -= 1
+    np.add.at(out, motion.find(person, first), 1)
+    np.add.at(out, motion.find(person, last + 1), -1)
     return np.cumsum(out)[:-1] > 0
 
 
-def _lines(motion: MotionRows, waits: Bools, stride: int) -> list[_LineNow]:
+def _lines(motion: MotionRows, waits: Bools, stride: int, ids: Ints | None = None) -> list[_LineNow]:
+    """Returns the lines of waiting people in all moments, in order of time; waits (R,): who waits. ids: of the columns;
+    None: the columns themselves."""
     some = np.flatnonzero(waits & (motion.frame % stride == 0))
     some = some[np.argsort(motion.frame[some], kind="stable")]
     t, p, place, speed = motion.frame[some], motion.column[some], motion.pos[some], np.nan_to_num(motion.vel[some])
+    every = np.argsort(motion.frame, kind="stable")
+    person = motion.column if ids is None else ids[motion.column]
+    cuts = np.searchsorted(motion.frame[every], np.arange(motion.length + 1))
+    there = {k: every[cuts[k] : cuts[k + 1]] for k in np.unique(t).tolist()}
+    groups = {k: (person[rows], motion.group[rows]) for k, rows in there.items()}
+    p = p if ids is None else ids[p]
     made: list[_LineNow] = []
     for rows, count, u, middle in queue_shapes(place, *close_pairs(t, place, MAX_SPACING)):
         within = np.arange(rows.shape[1]) < count[:, None]
@@ -264,7 +344,10 @@ def _lines(motion: MotionRows, waits: Bools, stride: int) -> list[_LineNow]:
         drift = (mean * u).sum(axis=1) + 1j * cross(u, mean)
         vectors = (x[:, 0] + 1j * x[:, 1] for x in (u, middle))
         columns = (x.tolist() for x in (t[rows[:, 0]], count, p[rows], *vectors, drift))
-        made += [_LineNow(when, tuple(people[:n]), *rest) for when, n, people, *rest in zip(*columns, strict=True)]
+        made += [
+            _LineNow(when, tuple(people[:n]), *rest, groups[when])
+            for when, n, people, *rest in zip(*columns, strict=True)
+        ]
     return sorted(made, key=lambda m: (m.t, min(m.order)))
 
 
@@ -277,14 +360,14 @@ def _follow(following: list[_FollowedLine], now: _LineNow, hold: int, bridge: in
         f = max(fits, key=lambda f: (len(people.intersection(f.now.order)), -f.since))
         now = now if _same_way(f.now, now) else now.turned()
     elif long:
-        f = _FollowedLine(now, now.t, now.t, now.middle, Counter())
+        f = _FollowedLine(now, now.t, now.t, now.middle, now.there, Counter())
         following.append(f)
     else:
         return
     if long:
         # A line that was too short for too long before it became a queue starts anew.
         if now.t - f.three > bridge and f.three - f.since < hold:
-            f.since, f.seen, f.drift, f.moments = now.t, Counter(), 0.0, 0
+            f.since, f.there, f.seen, f.drift, f.moments = now.t, now.there, Counter(), 0.0, 0
         f.three = now.t
     f.now, f.drift, f.moments = now, f.drift + now.drift, f.moments + 1
     f.seen.update(now.order)

@@ -36,6 +36,24 @@ def chords(frame: Ints, id: Ints, pos: Array, fps: float, window: float = WINDOW
     return _chords(frame, id, pos, fps, frames_of(window, fps), 0, np.nan)
 
 
+class RecentChords:
+    """The velocities of `chords`, of rows that are added frame by frame. State: frame, id, pos, rows of the last 0.5
+    s."""
+
+    def __init__(self, fps: float, dims: int = 2) -> None:
+        self.fps, self.frames = fps, frames_of(WINDOW, fps)
+        self.frame, self.id = np.zeros((2, 0), np.int64)
+        self.pos = np.zeros((0, dims))
+
+    def add(self, frame: Ints, id: Ints, pos: Array) -> Array:
+        """Returns the velocities (R, D) of rows of the next frames; arguments as of `chords`, frames ascending."""
+        old = len(self.frame)
+        frame, id, pos = np.append(self.frame, frame), np.append(self.id, id), np.concatenate([self.pos, pos])
+        recent = frame > frame[-1] - self.frames if len(frame) else np.zeros(0, bool)
+        self.frame, self.id, self.pos = frame[recent], id[recent], pos[recent]
+        return chords(frame, id, pos, self.fps)[old:]
+
+
 def _chords(frame: Ints, id: Ints, pos: Array, fps: float, back: int, ahead: int, alone: float) -> Array:
     """Returns the velocities from the id's first to its last row within `back` and `ahead` frames of each row."""
     order = np.lexsort((frame, id))

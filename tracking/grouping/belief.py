@@ -14,7 +14,7 @@ as a false event costs more than a late one; their log-odds are fitted to scenes
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import cache, lru_cache
 from hashlib import sha256
 from pathlib import Path
@@ -25,12 +25,8 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import is_number
 from scenarios.loading.toml_files import parse, toml_value
-from sim.truth.merge_split_rules import frames_of, runs
-from sim.types import Array, Bools, Ints
-from tracking.grouping.mate_share import MateShare
-from tracking.grouping.pair_evidence import NAMES, evidence
-from tracking.grouping.person_motion import StepRows, frames_per_step, step_rows
-from tracking.grouping.tracks_table import TracksTable
+from sim.types import Array, Ints
+from tracking.grouping.pair_evidence import NAMES
 
 FROZEN = Path(__file__).with_name("belief.toml")  # The default belief.
 KIND = "belief"
@@ -129,90 +125,6 @@ def _joined(belief: Belief) -> tuple[Ints, Ints, Array, Array]:
     return column, cut, at, np.concatenate([table.log_odds for table in belief.tables], axis=2)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class PairBeliefs:
-    """Log-odds that two people belong together, one row per pair and step in which they were seen within 4 m,
-    and per step in which they are missed after it."""
-
-    step: Ints  # (R,): from 0, ascending
-    # a, b (R,): columns, a < b; log_odds (R, 2): for `DECISIONS`
-    a: Ints
-    b: Ints
-    log_odds: Array
-    noise: Array  # (R,): of positions, m
-    missed: Bools  # (R,): True where not both were seen, and the pair keeps its last log-odds
-
-    def take(self, rows: Bools) -> PairBeliefs:
-        """Returns the rows where `rows` (R,) is True."""
-        return PairBeliefs(*(getattr(self, field.name)[rows] for field in fields(self)))
-
-
-def pair_beliefs(seen: StepRows, seconds: float, belief: Belief) -> PairBeliefs:
-    """Returns the beliefs of all pairs of people in the steps in which the two are within 4 m of each other. seconds:
-    length of a step, s."""
-    share, parts = MateShare(belief.share), []
-    for rows in evidence(seen, seconds):
-        log_odds = belief.log_odds(rows.values, rows.noise)
-        log_odds[:, 0] += share.add(rows.step, rows.pair, log_odds[:, 0])
-        parts.append((rows.step, rows.a, rows.b, log_odds, rows.noise, np.zeros(len(rows.step), bool)))
-    if not parts:
-        nobody = np.zeros(0, np.int64)
-        return PairBeliefs(nobody, nobody, nobody, np.zeros((0, 2)), np.zeros(0), np.zeros(0, bool))
-    return PairBeliefs(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-
-
-def beliefs_of_tracks(
-    frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief, measured: Bools | None = None
-) -> PairBeliefs:
-    """Returns the beliefs of all pairs of people of a sequence of `length` frames.
-
-    frame, column (R,), from 0, pos (R, 2), m: frame, index of the person, and position of each person and frame.
-    measured (R,): False in rows of people who are predicted only, which are no evidence; None: all are measured.
-    Until both of a pair are measured again, the pair keeps its last log-odds: for as long as both are reported, and
-    `memory` seconds longer.
-    """
-    size, people = frames_per_step(fps), int(column.max(initial=0)) + 1
-    rows, shape = slice(None) if measured is None else measured, (-(-length // size), people)
-    seen = step_rows(frame[rows], column[rows], pos[rows], length, fps)
-    found = pair_beliefs(seen, size / fps, belief)
-    pair, step = found.a * people + found.b, -(-frame // size)
-    order = np.lexsort((found.step, pair))
-    reported = np.unique((column * (shape[0] + 1) + step)[step < shape[0]])
-    memory = frames_of(belief.memory * fps / size, 1.0)
-    row, at = _missed(pair[order], found.step[order], seen.column * (shape[0] + 1) + seen.step, reported, shape, memory)
-    row, step = np.concatenate([np.arange(len(pair)), order[row]]), np.concatenate([found.step, at])
-    missed = np.arange(len(row)) >= len(pair)
-    order = np.argsort(step, kind="stable")
-    row, step, missed = row[order], step[order], missed[order]
-    return PairBeliefs(step, found.a[row], found.b[row], found.log_odds[row], found.noise[row], missed)
-
-
-def _missed(
-    pair: Ints, step: Ints, seen: Ints, reported: Ints, shape: tuple[int, int], memory: int
-) -> tuple[Ints, Ints]:
-    """Returns (row, step) of rows that stand for steps in which one of a pair was missed, up to `memory` steps after
-    both were last reported. seen, reported: column * (S + 1) + step of each person and step, reported sorted. shape:
-    steps S, people P."""
-    steps, people = shape
-    a, b = pair // people, pair % people
-    last = np.concatenate([np.diff(pair) != 0, [True]])[: len(pair)]
-    following = np.where(last, steps, np.append(step[1:], steps)[: len(step)])
-    final = reported[np.diff(reported, append=-1) != 1]  # the ends of stretches in which a person is reported
-    until = [final[np.searchsorted(final, p * (steps + 1) + step)] for p in (a, b)]
-    gone = np.minimum(*(key % (steps + 1) for key in until)) + 1
-    end = np.minimum(following, gone + memory)
-    after = np.minimum(step + 1, steps - 1)
-
-    def both_seen(at: Ints, row: Ints) -> Bools:
-        return np.isin(a[row] * (steps + 1) + at, seen) & np.isin(b[row] * (steps + 1) + at, seen)
-
-    row, at = runs(step + 1, np.where(both_seen(after, np.arange(len(pair))), step + 1, end))
-    # a pair that is seen again without a row is far apart
-    both = np.cumsum(both_seen(at, row))
-    missed = both == np.append(0, both)[np.searchsorted(row, row)]
-    return row[missed], at[missed]
-
-
 @cache
 def default_belief() -> Belief:
     """Returns the belief of belief.toml, which is fitted to simulated scenes."""
@@ -256,32 +168,3 @@ def _numbers(
 def _refuse(path: str | Path, place: str, got: object, expected: str) -> None:
     remedy = "write the file with: flockscope fit grouping"
     raise InputError(file=path, place=place, got=repr(got), expected=expected, remedy=remedy)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PairProbabilities:
-    """Rows of pairs, sorted by frame, then ids: frame (R,) from 1; a, b (R,): ids, a < b; probability (R,), 0 to 1."""
-
-    frame: Ints
-    a: Ints
-    b: Ints
-    probability: Array
-
-
-def pair_probabilities(table: TracksTable, fps: float, belief: Belief) -> PairProbabilities:
-    """Returns the probability that two people belong together now, for all pairs less than 4 m apart in each frame.
-
-    A pair's probability is computed once per step of at most 0.4 s and repeated in the frames of that step in which
-    both are reported. While one of the two is predicted only, it stays as it was. table: of people at the places from
-    which groups are derived (`people_in_metres`).
-    """
-    found = beliefs_of_tracks(table.frame, table.column, table.pos, table.length, fps, belief, table.seen)
-    size = frames_per_step(fps)
-    known = found.step * size
-    row, frame = runs(known, np.minimum(known + size, table.length))
-    a, b, present = found.a[row], found.b[row], table.frame * len(table.ids) + table.column
-    both = np.isin(frame * len(table.ids) + a, present) & np.isin(frame * len(table.ids) + b, present)
-    row, frame, a, b = row[both], frame[both], a[both], b[both]
-    order = np.lexsort((b, a, frame))
-    probability = 1 / (1 + np.exp(-found.log_odds[row, 0]))
-    return PairProbabilities(frame[order] + 1, table.ids[a[order]], table.ids[b[order]], probability[order])

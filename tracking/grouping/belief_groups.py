@@ -8,121 +8,194 @@ threshold, groups of *events* its log-odds; both with a memory of the step befor
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from sim.truth.merge_split_rules import frames_of, runs, stretches
-from sim.types import Array, Bools, Ints
-from tracking.grouping.belief import UNSEEN, Belief, PairBeliefs, beliefs_of_tracks
+from sim.types import Array, Ints
+from tracking.grouping.belief import UNSEEN, Belief
 from tracking.grouping.group_events import SEARCHED
 from tracking.grouping.link_rule import CELLS, Links
-from tracking.grouping.person_motion import StepRows, frames_per_step, step_rows
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class FoundGroups:
-    """Who belongs together in a sequence: the links between people, from which events follow, and the groups now."""
-
-    links: Links
-    now: StepGroups | None = None  # by step of `size` frames; None: as linked
-    size: int = 1
+from tracking.grouping.motion_history import PeopleRows
+from tracking.grouping.pair_beliefs import BeliefHistory, PairBeliefs, StepBeliefs
+from tracking.grouping.person_motion import taken
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StepGroups:
-    """The groups of S steps and P people, one row per step and person in a group, sorted by step, then person."""
+    """The groups of steps, one row per step and person in a group, sorted by step, then person."""
 
-    shape: tuple[int, int]  # S, P
     # step, person (R,), from 0; group (R,): the lowest person of the person's group
     step: Ints
     person: Ints
     group: Ints
 
-    def of(self, step: Ints, person: Ints) -> Ints:
-        """Returns the group of people in steps, -1 for people alone; arrays of one shape."""
-        key, wanted = self.step * self.shape[1] + self.person, step * self.shape[1] + person
-        row = np.searchsorted(key, wanted)
-        return np.where(np.append(key, -1)[row] == wanted, np.append(self.group, -1)[row], -1)
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FoundGroups:
+    """Who belongs together in some frames: the switches of links between people, from which events follow, and the
+    groups now, which begin with those of the step before; None: as linked."""
+
+    links: Links
+    now: StepGroups | None = None
+    steps: StepBeliefs | None = None  # from which they follow, if they follow from a belief
 
 
-def groups_of_steps(
-    shape: tuple[int, int], step: Ints, a: Ints, b: Ints, values: Array, unseen: float, stay: float = 0.0,
-    come: float = 0.0, nearest: float = 0.0,
-) -> StepGroups:  # fmt: skip
-    """Returns the groups of each step.
+class StepGrouping:
+    """Finds the groups of each step by linkage. unseen: value of pairs without a row. stay is added to the value of a
+    pair that was in one group in the step before, come is subtracted from the value of any other pair. nearest: weight
+    of the best pairs. State: label (K,), the lowest person of each person's group in the last step, -1 alone."""
 
-    step, a, b, values (R,): one row per pair (a, b) and step, step ascending; pairs without a row have the value
-    `unseen`. stay is added to the value of a pair that was in one group in the step before, come is subtracted from
-    the value of any other pair. nearest: weight of the best pairs.
+    def __init__(self, unseen: float, stay: float = 0.0, come: float = 0.0, nearest: float = 0.0) -> None:
+        self.numbers, self.label = (unseen, stay, come, nearest), np.zeros(0, np.int64)
+
+    def take_people(self, rows: Ints) -> None:
+        """Renumbers the people, who keep their order: person k becomes who was person rows[k], or somebody new if
+        rows[k] is -1."""
+        place = np.full(len(self.label) + 1, -1)
+        place[rows[rows >= 0]] = np.flatnonzero(rows >= 0)
+        self.label = place[taken(self.label, rows, -1)]
+
+    def add(self, first: int, end: int, step: Ints, a: Ints, b: Ints, values: Array) -> StepGroups:
+        """Returns the groups of the steps first … end - 1, and, to begin with, of the step before. step, a, b, values
+        (R,): one row per pair (a, b) and step, step ascending."""
+        from tracking.grouping.belief_kernels import linked_groups
+
+        people = len(self.label)
+        cut, found = np.searchsorted(step, np.arange(first, end + 1)), [_in_groups(first - 1, self.label[None])]
+        size = max(1, CELLS // max(people, 1))
+        for low in range(0, end - first, size):
+            # the first row is the step before, which has no rows of pairs here
+            ends = cut[low : low + size + 1]
+            label = np.full((len(ends), people), -1)
+            label[0] = self.label
+            linked_groups(np.append(ends[0], ends), a, b, values, *self.numbers, label)
+            found.append(_in_groups(first + low, label[1:]))
+            self.label = label[-1]
+        return StepGroups(*(np.concatenate(x) for x in zip(*found, strict=True)))
+
+
+def _in_groups(first: int, label: Ints) -> tuple[Ints, Ints, Ints]:
+    at, person = np.nonzero(label >= 0)
+    return at + first, person, label[at, person]
+
+
+class BeliefGroups:
+    """Finds the groups of frames by a belief. Any two members of a group from which events follow are linked.
+
+    State: history, of the beliefs; now, lasting: the groups from which people's labels and events follow; links.
     """
-    from tracking.grouping.belief_kernels import linked_groups
 
-    steps, people = shape
-    cut, found = np.searchsorted(step, np.arange(steps + 1)), []
-    size, before = max(1, CELLS // max(people, 1)), np.full(people, -1)
-    for low in range(0, steps, size):
-        # the first row is the step before, which has no rows of pairs here
-        ends = cut[low : low + size + 1]
-        label = np.full((len(ends), people), -1)
-        label[0] = before
-        linked_groups(np.append(ends[0], ends), a, b, values, unseen, stay, come, nearest, label)
-        at, person = np.nonzero(label[1:] >= 0)
-        found.append((at + low, person, label[at + 1, person]))
-        before = label[-1]
-    return StepGroups(shape, *(np.concatenate([np.zeros(0, np.int64), *x]) for x in zip(*found, strict=True)))
+    def __init__(self, fps: float, belief: Belief) -> None:
+        self.belief, self.history = belief, BeliefHistory(fps, belief)
+        unseen = float(belief.together(np.array(UNSEEN), np.array(0.0)))
+        self.now = StepGrouping(unseen, belief.hold, belief.join, belief.nearest)
+        self.lasting = StepGrouping(UNSEEN, belief.stay, belief.come, belief.nearest)
+        self.links = _LinkedPairs(frames_of(SEARCHED * fps / self.history.size, 1.0), self.history.size)
+
+    def take_people(self, rows: Ints) -> None:
+        """Renumbers the people, as `PairHistory.take_people`."""
+        for state in (self.history, self.now, self.lasting, self.links):
+            state.take_people(rows)
+
+    def forget(self, before: int) -> None:
+        """Forgets the pairs of people who were last near each other before a frame."""
+        self.history.pairs.forget(before // self.history.size)
+
+    def add(self, rows: PeopleRows, column: Ints, end: int) -> FoundGroups:
+        """Adds the frames up to `end`, and returns the groups of the steps that are complete now. column (R,): the
+        person of each row, from 0."""
+        steps, belief = self.history.add(rows.frame, column, rows.pos, rows.seen, end), self.belief
+        found = steps.pairs
+        # What cannot be seen changes nothing: such pairs are linked if they were in one group in the step before.
+        log_odds = np.where(found.missed, belief.neutral, found.log_odds[:, 1])
+        pairs = steps.first, steps.end, found.step, found.a, found.b
+        now = self.now.add(*pairs, belief.together(found.log_odds[:, 0], found.noise))
+        lasting = self.lasting.add(*pairs, log_odds)
+        return FoundGroups(self.links.add(lasting, steps), now, steps)
 
 
-def belief_groups(
-    frame: Ints, column: Ints, pos: Array, length: int, fps: float, belief: Belief, measured: Bools | None = None
-) -> FoundGroups:
-    """Returns the groups of a sequence of `length` frames by a belief.
+class _LinkedPairs:
+    """Which pairs are linked: any two people of one group. searched: steps in which people must have been apart before
+    they were linked. size: frames in a step.
 
-    frame, column (R,), from 0, pos (R, 2), m: one row per person and frame. measured (R,): False in rows of people who
-    are predicted only, which are no evidence; None: all are measured. Any two members of a group from which events
-    follow are linked.
+    State: a, b (L,), the linked pairs, sorted; total (L,), sums of their log-odds since they are; recent, rows of
+    beliefs, and seen (R, 2), step and person, of the steps searched.
     """
-    size = frames_per_step(fps)
-    shape = (-(-length // size), int(column.max(initial=0)) + 1)
-    found = beliefs_of_tracks(frame, column, pos, length, fps, belief, measured)
-    # What cannot be seen changes nothing: such pairs are linked if they were in one group in the step before.
-    log_odds = np.where(found.missed, belief.neutral, found.log_odds[:, 1])
-    pairs = (found.step, found.a, found.b)
-    gain = belief.together(found.log_odds[:, 0], found.noise)
-    unseen = float(belief.together(np.array(UNSEEN), np.array(0.0)))
-    now = groups_of_steps(shape, *pairs, gain, unseen, belief.hold, belief.join, belief.nearest)
-    lasting = groups_of_steps(shape, *pairs, log_odds, UNSEEN, belief.stay, belief.come, belief.nearest)
-    rows = slice(None) if measured is None else measured
-    seen, searched = step_rows(frame[rows], column[rows], pos[rows], length, fps), frames_of(SEARCHED * fps / size, 1.0)
-    return FoundGroups(_links(lasting, size, found.take(~found.missed), seen, searched), now, size)
+
+    def __init__(self, searched: int, size: int) -> None:
+        self.searched, self.size, self.people = searched, size, 0
+        self.a, self.b = np.zeros((2, 0), np.int64)
+        self.total, self.recent, self.seen = np.zeros(0), list[PairBeliefs](), np.zeros((0, 2), np.int64)
+
+    def take_people(self, rows: Ints) -> None:
+        """Renumbers the people, as `PairHistory.take_people`."""
+        place = np.full(self.people + 1, -1)
+        place[rows[rows >= 0]] = np.flatnonzero(rows >= 0)
+        self.people = len(rows)
+        there = (place[self.a] >= 0) & (place[self.b] >= 0)
+        self.a, self.b, self.total = place[self.a[there]], place[self.b[there]], self.total[there]
+        self.recent = [replace(r, a=place[r.a], b=place[r.b]) for r in self.recent]
+        self.recent = [r.take((r.a >= 0) & (r.b >= 0)) for r in self.recent]
+        self.seen = np.column_stack([self.seen[:, 0], place[self.seen[:, 1]]])
+        self.seen = self.seen[self.seen[:, 1] >= 0]
+
+    def add(self, label: StepGroups, steps: StepBeliefs) -> Links:
+        """Returns the switches of links in some steps. label: their groups, and those of the step before.
+
+        A removal is sure if the pair's log-odds, summed over the time of the link, are positive; a link if they were
+        negative before, summed over as many steps as are searched, or the two were too far apart for evidence.
+        """
+        people, first, end = self.people, steps.first, steps.end
+        self.recent.append(steps.pairs.take(~steps.pairs.missed))
+        self.seen = np.concatenate([self.seen, np.column_stack([steps.seen.step, steps.seen.column])])
+        both, t = _pairs_in_groups(label, people)
+        both, begin, last = stretches(both, t, 1)
+        on, off = begin >= first, last + 1 < end
+        rows = [np.concatenate([getattr(r, name) for r in self.recent]) for name in ("step", "a", "b")]
+        step, key, log_odds = rows[0], rows[1] * people + rows[2], np.concatenate([r.log_odds for r in self.recent])[:, 1]
+        order = np.lexsort((step, key))
+        key, log_odds = key[order] * (end + 1) + step[order], log_odds[order]
+        low, high = (np.searchsorted(key, both * (end + 1) + at) for at in (np.maximum(begin, first), last + 1))
+        linked = self.a * people + self.b
+        before = np.where(on, 0.0, np.append(self.total, 0.0)[np.searchsorted(linked, both)])
+        total = _sums(before, log_odds, low, high)
+        since = np.maximum(begin - self.searched, 0)
+        low, high = (np.searchsorted(key, both * (end + 1) + at) for at in (since, begin))
+        k, at = runs(since, np.where(on, begin, since))
+        where = np.sort(self.seen[:, 1] * (end + 1) + self.seen[:, 0])
+        there = np.isin(both[k] // people * (end + 1) + at, where) & np.isin(both[k] % people * (end + 1) + at, where)
+        met = np.bincount(k, there, len(both)) > high - low  # also where they had no row
+        sure_on = met | (_sums(np.zeros(len(both)), log_odds, low, np.where(on, high, low)) < 0)
+        self.a, self.b = divmod(both[~off], max(people, 1))
+        self.total = total[~off]
+        self.recent = [r.take(r.step >= end - self.searched) for r in self.recent]
+        self.recent = [r for r in self.recent if len(r.step)]
+        self.seen = self.seen[self.seen[:, 0] >= end - self.searched]
+        t, pair = np.concatenate([begin[on], last[off] + 1]), np.concatenate([both[on], both[off]])
+        sure = np.concatenate([sure_on[on], total[off] > 0])
+        set_ = np.arange(len(t)) < int(on.sum())
+        order = np.lexsort((pair, t))
+        t, pair = t[order], pair[order]
+        return Links(t * self.size, pair // max(people, 1), pair % max(people, 1), set_[order], sure[order])
 
 
-def _links(label: StepGroups, size: int, found: PairBeliefs, seen: StepRows, searched: int) -> Links:
-    """Returns all switches of links: any two people of one group are linked. A removal is sure if the pair's log-odds,
-    summed over the time of the link, are positive; a link if they were negative before, summed over as many steps as
-    are searched, or the two were too far apart for evidence."""
-    steps, people = label.shape
+def _pairs_in_groups(label: StepGroups, people: int) -> tuple[Ints, Ints]:
+    """Returns key and step of any two people of one group in each step, sorted."""
     group = label.step * people + label.group
     order = np.argsort(group, kind="stable")
     t, person, group = label.step[order], label.person[order], group[order]
     i, j = runs(np.arange(len(group)) + 1, np.searchsorted(group, group, side="right"))
-    low, high = np.minimum(person[i], person[j]), np.maximum(person[i], person[j])
-    both, when = low * people + high, t[i]
+    both, when = np.minimum(person[i], person[j]) * people + np.maximum(person[i], person[j]), t[i]
     order = np.lexsort((when, both))
-    both, first, last = stretches(both[order], when[order], 1)
-    row = (found.a * people + found.b) * steps + found.step
-    order = np.argsort(row)
-    total, row = np.append(0.0, np.cumsum(found.log_odds[order, 1])), row[order]
-    since = np.maximum(first - searched, 0)
-    before, begin, end = (np.searchsorted(row, both * steps + at) for at in (since, first, last + 1))
-    where = np.sort(seen.column * steps + seen.step)
-    k, at = runs(since, first)
-    there = np.isin(both[k] // people * steps + at, where) & np.isin(both[k] % people * steps + at, where)
-    met = np.bincount(k, there, len(both)) > begin - before  # also where they had no row
-    ends = last + 1 < steps
-    t, both = np.concatenate([first, last[ends] + 1]), np.concatenate([both, both[ends]])
-    on = np.arange(len(t)) < len(first)
-    sure = np.append(met | (total[begin] < total[before]), (total[end] > total[begin])[ends])
-    order = np.lexsort((both, t))
-    t, both = t[order], both[order]
-    return Links(t * size, both // people, both % people, on[order], sure[order])
+    return both[order], when[order]
+
+
+def _sums(start: Array, values: Array, low: Ints, high: Ints) -> Array:
+    """Returns start (K,) plus the sums of values[low:high], added one after another, so that it does not matter in how
+    many calls they are."""
+    k, at = runs(low, high)
+    rows = np.concatenate([np.arange(len(start)), k])
+    order = np.argsort(rows, kind="stable")
+    return np.bincount(rows[order], np.concatenate([start, values[at]])[order], len(start))

@@ -10,7 +10,7 @@ import numpy as np
 
 from sim.compiler import njit
 from sim.elementary_kernels import find_root
-from sim.types import Array, Ints
+from sim.types import Array, Bools, Ints
 
 
 @njit(cache=True)
@@ -107,6 +107,42 @@ def shifts_of_share(
             shift[0] = np.log(mates / (pairs - mates)) - usual
         out[low:high] = shift[0]
         low = high
+
+
+@njit(cache=True)
+def keep_missed(
+    first: int, cut: Ints, row_pair: Ints, a: Ints, b: Ints, seen: Bools, reported: Bools, memory: int, gone: Ints,
+    out: Ints,
+) -> int:
+    """Writes the pairs that keep their belief in steps in which one of the two is missed, and returns how many rows of
+    out, (N, 2): step and pair, there are; all of them are counted if out is too small.
+
+    first: number of the first of S steps. cut (S + 1,): where the rows of each step begin in row_pair (R,), the pairs
+    with evidence. a, b (K,): people of each pair. seen, reported (S, P): who is seen, and who is reported at all.
+    memory: steps for which a belief is kept after both were last reported. State, gone (K,): the step in which a pair
+    was first reported no more; -1 as long as it is, -2 if it has no belief to keep.
+    """
+    count = 0
+    for s in range(len(seen)):
+        fresh = row_pair[cut[s] : cut[s + 1]]
+        n = 0
+        for k in range(len(gone)):
+            if n < len(fresh) and fresh[n] == k:
+                gone[k] = -1
+                n += 1
+            elif gone[k] > -2:
+                if seen[s, a[k]] and seen[s, b[k]]:
+                    gone[k] = -2
+                    continue
+                if gone[k] < 0 and not (reported[s, a[k]] and reported[s, b[k]]):
+                    gone[k] = first + s
+                if 0 <= gone[k] <= first + s - memory:
+                    gone[k] = -2
+                    continue
+                if count < len(out):
+                    out[count, 0], out[count, 1] = first + s, k
+                count += 1
+    return count
 
 
 @njit(cache=True)

@@ -8,22 +8,15 @@ in the image from pixels are never moved, as the foot of a blob is no person's.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
 
 from sim.scene.standing import standing_points
-from sim.types import Array, Bools, Camera, GroupEvent, Ints, Scene, Tracks
+from sim.types import Array, Camera, Scene, Tracks
 from tracking.grouping.ground_of_boxes import Ground, ground_of_boxes
-from tracking.grouping.grouped_tracks import (
-    filled,
-    groups_in_frames,
-    labels_and_events,
-    names_groups,
-    with_groups,
-    with_velocities,
-)
+from tracking.grouping.grouped_tracks import GroupsSoFar, groups_in_frames, moved_events, names_groups, with_groups
 from tracking.grouping.grouping_choice import Grouping
 from tracking.grouping.tracks_table import TracksTable, tabulate
 
@@ -87,10 +80,8 @@ def completed(
     ground = ground_below(tracks, camera, px_per_m, source, image_size)
     if ground.camera is None:
         return with_groups(tracks, fps, px_per_m, rule, objective=objective), ground
-    places = _places(tracks, ground, scene)
-    _, labels, events = labels_and_events(tracks, fps, 1.0, rule, objective=objective, places=places)
-    there = [moved_events(new, t.id, t.pos) for t, new in zip(tracks, events, strict=True)]
-    return tuple(filled(with_velocities(tracks, fps), labels, there, objective=objective)), ground
+    groups = GroupsSoFar(fps, 1.0, rule, objective=objective, places=partial(places_on, ground, scene))
+    return tuple(groups.ended(groups.add(tracks))), ground
 
 
 def people_in_metres(
@@ -101,11 +92,11 @@ def people_in_metres(
     ground = ground_below(tracks, camera, px_per_m, source, image_size)
     if ground.camera is None:
         return tabulate(tracks, fps, px_per_m)
-    return tabulate(tracks, fps, 1.0, _places(tracks, ground, scene))
+    return tabulate(tracks, fps, 1.0, places_on(ground, scene, tracks))
 
 
-def _places(tracks: Sequence[Tracks], ground: Ground, scene: Scene | None) -> Array:
-    """Returns the points on a known ground (R, 2), m, of all rows. Boxes that show the ground tell no place in the
+def places_on(ground: Ground, scene: Scene | None, tracks: Sequence[Tracks]) -> Array:
+    """Returns the points on a known ground (R, 2), m, of all rows of tracks. Boxes that show the ground tell no place in the
     scene."""
     assert ground.camera is not None
     return standing_points(_boxes(tracks), ground.camera, scene if ground.source == "camera" else None)
@@ -129,14 +120,3 @@ def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> l
     named = [t.groups is not None or bool((t.group >= 0).any()) for t in moved]
     every = groups_in_frames(moved) if any(named) else [None] * len(moved)
     return [t.replace(groups=groups if own else None) for t, groups, own in zip(moved, every, named, strict=True)]
-
-
-def moved_events(events: Sequence[GroupEvent], id: Ints, pos: Array) -> tuple[GroupEvent, ...]:
-    """Returns the events with each `pos` replaced by the mean position of its members in one frame, nan if none is. id
-    (N,), pos (N, 2): ids and positions of the people in that frame."""
-    return tuple(replace(e, pos=_centre(pos, np.isin(id, e.members))) for e in events)
-
-
-def _centre(pos: Array, rows: Bools) -> tuple[float, float]:
-    x, y = pos[rows].mean(axis=0) if rows.any() else (float("nan"), float("nan"))
-    return float(x), float(y)

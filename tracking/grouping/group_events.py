@@ -1,10 +1,10 @@
 """Merge, split, form, dissolve, enter and leave events of groups of tracked people: from changes of their groups.
 
-Two sources: links that a grouping switched (`event_of_change`), or labels that a tracker gave (`events_of_labels`).
+Two sources: links that a grouping switched (`event_of_change`), or labels that a tracker gave (`LabelEvents`).
 Changes that only correct what was believed are no events: who was not seen apart does not merge, and who was not seen
 together, or is not apart, does not split (`TrackedMotion.onset`, `corrects`).
-What a change is called follows from sim.truth.group_ids_and_changes, the same rule as in the truth. People are columns
-of arrays, frames count from 0; in the returned events people are columns + 1, frames count from 1.
+What a change is called follows from sim.truth.group_ids_and_changes, the same rule as in the truth. People are numbers,
+such as ids of tracks; frames count from 0, in the returned events from 1.
 """
 
 from __future__ import annotations
@@ -12,32 +12,44 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Protocol
 
 import numpy as np
 
 from sim.truth.group_ids_and_changes import GroupChange, PersonSet, group_changes
 from sim.truth.merge_split_events import connected
 from sim.truth.merge_split_rules import HOLD_TIME, MERGE_DISTANCE, frames_of, separation, stretches
-from sim.truth.motion_rows import MotionRows, frames_of_change
-from sim.types import Bools, GroupEvent, Ints
+from sim.truth.motion_rows import frames_of_change
+from sim.types import Array, Bools, GroupEvent, Ints
 
 SEARCHED = 12.0  # s before the report in which people must have been seen to come together or to part.
+REMEMBERED = 60.0  # s for which motion, and whoever is seen no more, is remembered at least.
 ARRIVAL = 1.0  # s: who is there so soon after the first frame was there before it, and does not enter.
 BRIDGED = 0.5  # s: gaps in a stretch that do not end it.
 LOOK_BACK = 20  # Frames before an event's start in which its position is looked for.
+
+
+class PastMotion(Protocol):
+    """The motion of people up to now, such as a `MotionHistory`."""
+
+    def window(self, people: Sequence[int], first: int, end: int) -> tuple[Array, Array, Ints]:
+        """Returns positions, velocities (N, K, 2) and groups (N, K) of K people in the frames first … end - 1; nan and
+        -1 where a person is absent."""
+
+    def measured_count(self, people: Sequence[int], first: int, end: int) -> Ints:
+        """Returns how many of some people are measured in each of the frames first … end - 1."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrackedMotion:
     """The motion of tracked people."""
 
-    rows: MotionRows
+    rows: PastMotion
     fps: float  # frames per second
-    measured: MotionRows | None = None  # rows in which people are measured, not predicted; None: all rows
 
     def onset(self, a: PersonSet, b: PersonSet, t: int, *, joins: bool) -> int | None:
         """Returns the frame in which two parts came together (joins True) or parted (False), as known in frame t. a, b:
-        the parts, sets of columns. Frames count from 0; only the 12 s before t are searched.
+        the parts, sets of people. Frames count from 0; only the 12 s before t are searched.
 
         It is None if the parts were not apart before they came together or are not near now, and if they were not
         together before they parted or are not apart now.
@@ -72,7 +84,7 @@ class TrackedMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Parts:
-    """The parts that a merge or enter joined, or that a split left: groups and people alone, as sets of columns."""
+    """The parts that a merge or enter joined, or that a split left: groups and people alone, as sets of people."""
 
     sets: Sequence[PersonSet]
     since: int  # frame (from 0) from which on a person of each has been present
@@ -90,8 +102,9 @@ def event_of_change(
     """
     # a group leaves when its last two people were measured, or its last one: it may be predicted for longer
     if change.kind == "leave":
-        seen = (motion.measured or motion.rows).count(change.members, t + 1)
-        start = int(np.flatnonzero(seen >= min(seen.max(), 2))[-1])
+        first = max(0, t + 1 - frames_of(REMEMBERED, motion.fps))
+        seen = motion.rows.measured_count(change.members, first, t + 1)
+        start = first + int(np.flatnonzero(seen >= min(seen.max(), 2))[-1])
     elif change.kind != "enter":
         joins = change.kind not in ("split", "dissolve")
         # whoever held a group together may be gone
@@ -128,36 +141,49 @@ def were_apart(change: GroupChange, joined: Mapping[PersonSet, bool]) -> bool:
     return not sure or any(sure)
 
 
-def events_of_labels(motion: MotionRows) -> list[GroupEvent]:
-    """Returns the events that follow from changes of the groups of people, sorted by time."""
-    order = np.lexsort((motion.column, motion.frame))
-    frame, column, group = motion.frame[order], motion.column[order], motion.group[order]
-    events, old, before = [], dict[int, PersonSet](), frozenset[int]()
-    for t in [0, *frames_of_change(frame, column, group, motion.length)]:
-        rows = slice(*np.searchsorted(frame, (t, t + 1)))
-        new, now = _members(column[rows], group[rows]), frozenset(column[rows].tolist())
-        changes = group_changes(old, new, before, now) if t else []
-        events += [_event(c, t - (c.kind == "leave"), t - (c.kind == "leave"), t, motion) for c in changes]
-        old, before = new, now
-    return events
+class LabelEvents:
+    """The events that follow from changes of the groups that a tracker names. State: groups, by id, and people of the
+    last frame; end, number of frames."""
+
+    def __init__(self) -> None:
+        self.groups, self.people, self.end = dict[int, PersonSet](), frozenset[int](), 0
+
+    def add(self, frame: Ints, id: Ints, group: Ints, motion: PastMotion, end: int) -> list[GroupEvent]:
+        """Adds the frames up to `end`, and returns the events in them, sorted by time. frame, id, group (R,): one row
+        per person of known position and frame, sorted by frame, then id. motion: of these frames, too."""
+        events, first = list[GroupEvent](), self.end
+        last = np.array(sorted(self.people), np.int64)
+        group_of = {p: g for g, people in self.groups.items() for p in people}
+        label = np.array([group_of.get(p, -1) for p in last.tolist()], np.int64)
+        ids, column = np.unique(np.append(last, id), return_inverse=True)
+        # the frame before counts as frame 0 here
+        rows = np.append(np.zeros_like(last), frame - first + 1), column, np.append(label, group)
+        for t in [first - 1 + k for k in frames_of_change(*rows, end - first + 1)]:
+            now = slice(*np.searchsorted(frame, (t, t + 1)))
+            new, there = _members(id[now], group[now]), frozenset(id[now].tolist())
+            changes = group_changes(self.groups, new, self.people, there) if t else []
+            for c in changes:
+                begin = t - (c.kind == "leave")
+                events.append(_event(c, begin, begin, t, motion))
+            self.groups, self.people = new, there
+        self.end = end
+        return events
 
 
-def _event(change: GroupChange, start: int, end: int, t: int, motion: MotionRows) -> GroupEvent:
-    """Returns the event of a change, people as columns + 1, frames from 1; start, end, t count from 0."""
+def _event(change: GroupChange, start: int, end: int, t: int, motion: PastMotion) -> GroupEvent:
+    """Returns the event of a change, frames from 1; start, end, t count from 0."""
     first = max(start - LOOK_BACK, 0)
     places = motion.window(change.members, first, t + 1)[0]
     known = np.flatnonzero(np.isfinite(places[..., 0]).sum(axis=1))
     # at the start itself nobody may be seen
     nearest = known[np.abs(known - (start - first)).argmin()]
     x, y = np.nanmean(places[nearest], axis=0)
-    members = tuple(p + 1 for p in change.members)
-    return GroupEvent(
-        change.kind, start + 1, end + 1, t + 1, change.before, change.after, members, (float(x), float(y))
-    )
+    place = float(x), float(y)
+    return GroupEvent(change.kind, start + 1, end + 1, t + 1, change.before, change.after, change.members, place)
 
 
-def _members(column: Ints, group: Ints) -> dict[int, PersonSet]:
+def _members(id: Ints, group: Ints) -> dict[int, PersonSet]:
     found: dict[int, set[int]] = {}
-    for p, g in zip(column.tolist(), group.tolist(), strict=True):
+    for p, g in zip(id.tolist(), group.tolist(), strict=True):
         found.setdefault(g, set()).add(p)
     return {g: frozenset(people) for g, people in found.items() if g >= 0 and len(people) > 1}

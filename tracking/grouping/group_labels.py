@@ -1,10 +1,9 @@
 """From links between two people to groups over time: group ids in each frame, and events of membership.
 
 A group is a connected component of linked people. Where the grouping says who is together *now*, these groups are
-shown, with the ids of the linked groups that they stand for; events are those of the linked groups. People are numbered
-as columns of arrays by frame and person, from 0; frames count from 0. Events are form, dissolve, merge, split, enter
-and leave; crossings and queues are not found here. Ids follow the rule of the truth
-(sim.truth.group_ids_and_changes): a group that changes keeps its id where it shares most members.
+shown, with the ids of the linked groups that they stand for; events are those of the linked groups. Frames count from
+0. Events are form, dissolve, merge, split, enter and leave; crossings and queues are not found here. Ids follow the
+rule of the truth (sim.truth.group_ids_and_changes): a group that changes keeps its id where it shares most members.
 """
 
 from __future__ import annotations
@@ -23,6 +22,7 @@ from tracking.grouping.belief import Belief
 from tracking.grouping.belief_groups import FoundGroups
 from tracking.grouping.group_events import Parts, TrackedMotion, corrects, event_of_change, were_apart
 from tracking.grouping.link_rule import LinkRule
+from tracking.grouping.person_motion import frames_per_step
 
 
 @dataclass
@@ -64,61 +64,112 @@ class LinkedPeople:
             (partners.add if on else partners.discard)(q)
 
 
-def label_people(
-    frame: Ints, column: Ints, motion: TrackedMotion, found: FoundGroups, rule: LinkRule | Belief
-) -> tuple[Ints, list[GroupEvent]]:
-    """Returns the group id of each row (R,), from 1, -1 alone, and the membership events in order of `emitted`. frame,
-    column (R,): frame, ascending, and person of each row, from 0. In events members are columns + 1, frames from 1."""
-    length = motion.rows.length
-    spells = _spells(frame, column, frames_of(rule.memory, motion.fps), length)
-    state, events = LinkedPeople(), []
-    group, group_of = np.full(len(frame), -1), np.full(int(column.max(initial=0)) + 1, -1)
-    links, shown, changes_now = found.links, dict[int, PersonSet](), _changes(found)
-    cuts, rows = (np.searchsorted(x, np.arange(length + 1)) for x in (links.frame, frame))
-    for t, until in pairwise([*sorted({*spells, *changes_now, *links.frame.tolist()}), length]):
-        for p, since in spells.get(t, ()):
-            if since is None:
-                state.present.pop(p, None)
+class GroupLabels:
+    """The group ids and membership events of people, frame by frame.
+
+    State: people, who is present and linked to whom, by id; last, the last frame of whoever is present; shown, the
+    groups that are shown, by id; end, number of frames so far.
+    """
+
+    def __init__(self, fps: float, rule: LinkRule | Belief) -> None:
+        self.memory, self.size = frames_of(rule.memory, fps), frames_per_step(fps)
+        self.people, self.shown = LinkedPeople(), dict[int, PersonSet]()
+        self.last, self.end = dict[int, int](), 0
+
+    def add(
+        self, frame: Ints, column: Ints, ids: Ints, motion: TrackedMotion, found: FoundGroups, end: int
+    ) -> tuple[Ints, list[GroupEvent]]:
+        """Adds the frames up to `end`. Returns the group id of each row (R,), from 1, -1 alone, and the membership
+        events in order of `emitted`; members are ids, frames count from 1.
+
+        frame, column (R,): frame, ascending, and person of each row, from 0. ids (K,): of the persons, ascending.
+        motion: of these frames, too. found: of these frames.
+        """
+        first, links, events, state = self.end, found.links, list[GroupEvent](), self.people
+        spells = self._spells(frame, ids[column], end)
+        group, group_of = np.full(len(frame), -1), np.full(len(ids), -1)
+        changes_now = _changes(found, self.size)
+        cuts, rows = (np.searchsorted(x, np.arange(first, end + 1)) for x in (links.frame, frame))
+        times = sorted({*spells, *changes_now, *links.frame.tolist()})
+
+        def fill(since: int, until: int) -> None:
+            for g, people in self.shown.items():
+                group_of[np.searchsorted(ids, list(people))] = g
+            lasting = slice(int(rows[since - first]), int(rows[until - first]))
+            group[lasting] = group_of[column[lasting]]
+            group_of[:] = -1
+
+        fill(first, times[0] if times else end)
+        for t, until in pairwise([*times, end]):
+            for p, since in spells.get(t, ()):
+                if since is None:
+                    state.present.pop(p, None)
+                else:
+                    state.present[p] = since
+            now = slice(int(cuts[t - first]), int(cuts[t - first + 1]))
+            linked = ids[links.a[now]].tolist(), ids[links.b[now]].tolist(), links.on[now].tolist()
+            switched = list(zip(*linked, links.sure[now].tolist(), strict=True))
+            old = state.identities.groups
+            for a, b, on, _ in switched:
+                state.switch(a, b, on)
+            changes = state.step(t, self.shown)
+            parts = _together_now(found, t // self.size, ids, state)
+            self.shown = state.identities.name(t, parts, self.shown)
+            fill(t, until)
+            joined, parted = (
+                {frozenset((a, b)): sure for a, b, x, sure in switched if x == on} for on in (True, False)
+            )
+            real = [c for c in changes if not corrects(c, parted)]
+            told = (
+                event_of_change(c, t, parts_of_change(c, old, state), motion, late=True, met=were_apart(c, joined))
+                for c in real
+            )
+            events += [e for e in told if e is not None]
+        self.end = end
+        return _without_singles(frame, group), events
+
+    def forget(self, ids: Set[int]) -> None:
+        """Forgets everybody but these people, and when groups began that are there no more."""
+        linked = self.people.linked
+        self.people.linked = {p: linked[p] & ids for p in linked.keys() & ids}
+        named = self.people.identities
+        named.born = {g: t for g, t in named.born.items() if g in named.groups or g in self.shown}
+
+    def _spells(self, frame: Ints, id: Ints, end: int) -> dict[int, list[tuple[int, int | None]]]:
+        """Returns by frame who comes, (person, frame), and whose spell ends, (person, None), after the last row."""
+        order = np.lexsort((frame, id))
+        before = np.array(sorted(self.last.items()), np.int64).reshape(-1, 2)
+        id, frame = np.append(before[:, 0], id[order]), np.append(before[:, 1], frame[order])
+        order = np.argsort(id, kind="stable")
+        found, present = dict[int, list[tuple[int, int | None]]](), dict[int, int]()
+        spells = stretches(id[order], frame[order], 1, self.memory + 1)
+        for p, first, last in zip(*(x.tolist() for x in spells), strict=True):
+            if first >= self.end:
+                found.setdefault(first, []).append((p, first))
+            if last + self.memory + 1 < end:
+                found.setdefault(last + self.memory + 1, []).append((p, None))
             else:
-                state.present[p] = since
-        now = slice(int(cuts[t]), int(cuts[t + 1]))
-        switched = list(zip(*(getattr(links, k)[now].tolist() for k in ("a", "b", "on", "sure")), strict=True))
-        old = state.identities.groups
-        for a, b, on, _ in switched:
-            state.switch(a, b, on)
-        changes = state.step(t, shown)
-        shown = state.identities.name(t, _together_now(found, t, state), shown)
-        for g, people in shown.items():
-            group_of[list(people)] = g
-        lasting = slice(int(rows[t]), int(rows[until]))
-        group[lasting] = group_of[column[lasting]]
-        for people in shown.values():
-            group_of[list(people)] = -1
-        joined, parted = ({frozenset((a, b)): sure for a, b, x, sure in switched if x == on} for on in (True, False))
-        real = [c for c in changes if not corrects(c, parted)]
-        told = (
-            event_of_change(c, t, parts_of_change(c, old, state), motion, late=True, met=were_apart(c, joined))
-            for c in real
-        )
-        events += [e for e in told if e is not None]
-    return _without_singles(frame, group), events
+                present[p] = last
+        self.last = present
+        return found
 
 
-def _changes(found: FoundGroups) -> list[int]:
+def _changes(found: FoundGroups, size: int) -> list[int]:
     """Returns the frames in which it changes who is together now."""
-    if found.now is None:
+    if found.now is None or found.steps is None:
         return []
-    changed = frames_of_change(found.now.step, found.now.person, found.now.group, found.now.shape[0])
-    return [step * found.size for step in changed]
+    now, before, length = found.now, found.steps.first - 1, found.steps.end - found.steps.first + 1
+    changed = frames_of_change(now.step - before, now.person, now.group, length)
+    return [(before + step) * size for step in changed]
 
 
-def _together_now(found: FoundGroups, t: int, state: LinkedPeople) -> Iterable[PersonSet]:
-    """Returns the groups of frame t, without people who are gone."""
+def _together_now(found: FoundGroups, step: int, ids: Ints, state: LinkedPeople) -> Iterable[PersonSet]:
+    """Returns the groups of a step, without people who are gone."""
     if found.now is None:
         return state.identities.groups.values()
-    parts, step = dict[int, set[int]](), t // found.size
+    parts = dict[int, set[int]]()
     rows = slice(*np.searchsorted(found.now.step, (step, step + 1)))
-    for p, g in zip(found.now.person[rows].tolist(), found.now.group[rows].tolist(), strict=True):
+    for p, g in zip(ids[found.now.person[rows]].tolist(), found.now.group[rows].tolist(), strict=True):
         parts.setdefault(g, set()).update({p} & state.present.keys())
     return [frozenset(people) for people in parts.values() if len(people) > 1]
 
@@ -142,17 +193,6 @@ def part_sets(change: GroupChange, old: Members, new: Members, people: PersonSet
     groups, names = (new, change.after) if change.kind in ("split", "dissolve") else (old, change.before)
     parts = [part for g in names if g >= 0 and (part := groups[g] & people)]
     return parts + [frozenset([p]) for p in sorted(people.difference(*parts))]
-
-
-def _spells(frame: Ints, column: Ints, memory: int, length: int) -> dict[int, list[tuple[int, int | None]]]:
-    """Returns by frame who comes, (column, frame), and whose spell ends, (column, None), after the last row."""
-    order = np.lexsort((frame, column))
-    found: dict[int, list[tuple[int, int | None]]] = {}
-    for p, first, last in zip(*stretches(column[order], frame[order], 1, memory + 1), strict=True):
-        found.setdefault(int(first), []).append((int(p), int(first)))
-        if last + memory + 1 < length:
-            found.setdefault(int(last) + memory + 1, []).append((int(p), None))
-    return found
 
 
 def _without_singles(frame: Ints, group: Ints) -> Ints:

@@ -1,6 +1,7 @@
 """Fill in groups and events of person tracks, for a tracker that reports none or only some of them.
 
-`with_groups` is the entry for runs and scores; `derive` does the work. Both are causal, apart from the last frame:
+`GroupsSoFar` does the work, frame by frame: it does not matter how many frames are added at once, so that a live run is
+equal to that of a recording. `with_groups` and `derive` add all frames of a sequence.
 - People are linked by the belief or the baseline rule (`grouping_choice`). Linked people form groups (`group_labels`).
 - Membership events follow from changes of the groups (`group_events`).
 - Crossings and queues are measured by `sim.truth.crossing_events` and `sim.truth.queue_detection`.
@@ -13,33 +14,36 @@ What the tracker reports itself is decided once, so that no later frame changes 
 An event is reported (`emitted`) in the frame in which it is known, and its `start` is the onset: a merge is known once
 the link holds, a crossing 2 s after its end, a queue 4.5 s after its end (3 s in which people may advance, and 1.5 s
 for which a line may be lost). Crossings and queues that are not known by the end of the recording are reported in its
-last frame, so that this frame is not causal.
+last frame (`GroupsSoFar.rest`), so that this frame is not causal.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from sim.truth.crossing_events import SAME_BEFORE, crossings
+from sim.truth.crossing_events import SAME_BEFORE, CrossingFinder
 from sim.truth.group_hulls import box_groups, groups_over_time
 from sim.truth.merge_split_rules import frames_of
-from sim.truth.queue_detection import ADVANCE_TIME, BRIDGE_TIME, queues
-from sim.truth.velocities import chords
-from sim.types import EVENT_KINDS, Array, GroupEvent, Groups, Ints, Tracks
-from tracking.grouping.belief import Belief
-from tracking.grouping.group_events import TrackedMotion, events_of_labels
-from tracking.grouping.group_labels import label_people
-from tracking.grouping.grouping_choice import Grouping, default_grouping, find_groups
-from tracking.grouping.person_motion import steady_places
-from tracking.grouping.tracks_table import TracksTable, tabulate
+from sim.truth.queue_detection import ADVANCE_TIME, BRIDGE_TIME, QueueFinder
+from sim.truth.velocities import RecentChords
+from sim.types import EVENT_KINDS, Array, Bools, GroupEvent, Groups, Ints, Tracks
+from tracking.grouping.belief_groups import FoundGroups
+from tracking.grouping.group_events import REMEMBERED, LabelEvents, TrackedMotion
+from tracking.grouping.group_labels import GroupLabels
+from tracking.grouping.grouping_choice import Grouping, default_grouping, group_finder
+from tracking.grouping.motion_history import MotionHistory, PeopleRows
+from tracking.grouping.person_motion import SteadyPlaces
+from tracking.grouping.tracks_table import people_rows
 
 # Kinds of events in which the membership of groups changes.
 MEMBERSHIP_KINDS = frozenset(EVENT_KINDS) - {"cross", "queue"}
+# Places (R, 2), m, of all rows of some tracks.
+Places = Callable[[Sequence[Tracks]], Array]
 PORTION = 5_000  # Frames worked on together: bounds memory.
 
 
@@ -53,22 +57,40 @@ def with_groups(
     """
     if all(t.derived for t in tracks):
         return tuple(tracks)
-    tracks = with_velocities(tracks, fps)
     if tracks[0].plane == "image" and not math.isfinite(px_per_m):
-        return tuple(tracks)
+        return tuple(with_velocities(tracks, fps))
     return tuple(derive(tracks, fps, px_per_m, rule, objective=objective))
 
 
-def with_velocities(tracks: Sequence[Tracks], fps: float) -> Sequence[Tracks]:
-    """Returns the tracks with each unknown (nan) velocity replaced by the mean velocity over the last 0.5 s."""
-    if not any(np.isnan(t.vel).any() for t in tracks):
-        return tracks
-    count = [len(t.id) for t in tracks]
-    frame, id = np.repeat([t.index for t in tracks], count), np.concatenate([t.id for t in tracks])
-    pos, vel = np.concatenate([t.pos for t in tracks]), np.concatenate([t.vel for t in tracks])
-    vel = np.where(np.isnan(vel).any(axis=1)[:, None], chords(frame, id, pos, fps), vel)
-    parts = np.split(vel, np.cumsum(count)[:-1])
-    return [t.replace(vel=part) if len(part) else t for t, part in zip(tracks, parts, strict=True)]
+class Velocities:
+    """Replaces unknown (nan) velocities of tracks by the mean velocities over the last 0.5 s. State: recent, where
+    people were."""
+
+    def __init__(self, fps: float) -> None:
+        self.fps, self.recent = fps, dict[int, RecentChords]()
+
+    def add(self, tracks: Sequence[Tracks]) -> list[Tracks]:
+        """Returns tracks of the next frames with velocities."""
+        dims = {t.pos.shape[1] for t in tracks if len(t.id)}
+        if not dims:
+            return list(tracks)
+        (d,) = dims
+        recent = self.recent.setdefault(d, RecentChords(self.fps, d))
+        some = [t for t in tracks if len(t.id)]
+        count = [len(t.id) for t in some]
+        frame, id = np.repeat([t.index for t in some], count), np.concatenate([t.id for t in some])
+        found = recent.add(frame, id, np.concatenate([t.pos for t in some]))
+        vel = np.concatenate([t.vel for t in some])
+        unknown = np.isnan(vel).any(axis=1)
+        if not unknown.any():
+            return list(tracks)
+        parts = iter(np.split(np.where(unknown[:, None], found, vel), np.cumsum(count)[:-1]))
+        return [t.replace(vel=next(parts)) if len(t.id) else t for t in tracks]
+
+
+def with_velocities(tracks: Sequence[Tracks], fps: float) -> list[Tracks]:
+    """Returns the tracks of a sequence with `Velocities`."""
+    return Velocities(fps).add(tracks)
 
 
 def names_groups(tracks: Sequence[Tracks]) -> bool:
@@ -106,88 +128,220 @@ def derive(
 ) -> list[Tracks]:  # fmt: skip
     """Returns the tracks with `group`, `groups` and `events` filled in where the tracker left them empty.
 
-    tracks: of a whole sequence, in order, one per frame from frame 1. If the tracker names groups in its first frame
-    with people, its groups are kept; otherwise the grouping forms all groups, and any that the tracker reports later
-    are removed. Events of a kind are derived for the frames before the tracker reports this kind itself.
-    objective: True leaves out crossings, queues and hulls, which the objective does not need.
+    tracks: of a whole sequence, in order, one per frame from frame 1. The other arguments are as of `GroupsSoFar`.
+    Unknown velocities are filled in, too.
     """
     given = list(tracks)
     if not given or any(t.unit == "group" for t in given):
         return given
-    table, labels, events = labels_and_events(given, fps, px_per_m, rule, objective=objective)
-    return filled(given, labels, events, table.scale, objective=objective)
+    groups = GroupsSoFar(fps, px_per_m, rule, objective=objective)
+    return groups.ended(groups.add(given))
 
 
-def labels_and_events(
-    tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None = None, *, objective: bool = False,
-    places: Array | None = None,
-) -> tuple[TracksTable, list[Ints], list[tuple[GroupEvent, ...]]]:  # fmt: skip
-    """Returns the table of people, and for each `Tracks` the group ids (N,) of its rows and the events to add.
+class GroupsSoFar:
+    """Fills in groups and events of tracks, frame by frame.
 
-    The arguments are as in `derive`. places: as of `tabulate`; the events then lie there.
+    If the tracker names groups in its first frame with people, its groups are kept; otherwise the grouping forms all
+    groups, and any that the tracker reports later are removed. Events of a kind are derived for the frames before the
+    tracker reports this kind itself. Whoever was not seen for 60 to 120 s is forgotten.
+
+    px_per_m: scale of tracks in the image. rule: how people are grouped; None takes the default grouping. objective:
+    True leaves out crossings, queues and hulls, which the objective does not need. places: where people are on the
+    ground; None: where the tracks say.
+
+    State: end, number of frames; named, whether the tracker names groups, None if that is not known yet; own, the frame
+    from which events of a kind are the tracker's; ids, people, and last, the last frame of each; same, whether the
+    groups that the tracker names have been those of the grouping so far; the rest as named.
     """
-    rule, named, own = rule or default_grouping(), names_groups(tracks), _own_events(tracks)
-    if not named:
-        # groups that appear later would change frames that are reported already
-        tracks = [t.replace(group=np.full(len(t.id), -1), groups=None) if _has_groups(t) else t for t in tracks]
-    table, events = tabulate(tracks, fps, px_per_m, places), list[GroupEvent]()
-    changes = not named or own.get("merge", math.inf) > 1
-    # what a tracker reports itself, and the objective leaves out, needs no places
-    steady = _steady(table, fps) if isinstance(rule, Belief) and (changes or not objective) else table
-    if changes:
-        group, events = _grouped(table, steady, named, fps, rule)
-        table, steady = replace(table, group=group), replace(steady, group=group)
-    events += [] if objective else _crossings_and_queues(steady, fps)
-    events = [e for e in events if (e.emitted or e.start) < own.get(e.kind, math.inf)]
-    return table, *_of_frames(tracks, table, events)
 
+    def __init__(
+        self, fps: float, px_per_m: float = 1.0, rule: Grouping | None = None, *, objective: bool = False,
+        places: Places | None = None,
+    ) -> None:  # fmt: skip
+        self.fps, self.px_per_m, self.objective, self.places = fps, px_per_m, objective, places
+        self.rule = rule or default_grouping()
+        self.end, self.own, self.same, self.scale, self.added = 0, dict[str, int](), True, 1.0, 0
+        self.named: bool | None = None
+        self.ids, self.last = np.zeros((2, 0), np.int64)
+        self.finder, self.labels = group_finder(self.rule, fps), GroupLabels(fps, self.rule)
+        self.steady, self.changes = SteadyPlaces(fps), LabelEvents()
+        self.crossings, self.queues = CrossingFinder(fps), QueueFinder(fps)
+        self.history = MotionHistory()
+        self.velocities = Velocities(fps)
+        self.place_velocities, self.steady_velocities = RecentChords(fps), RecentChords(fps)
+        self.block = frames_of(REMEMBERED, fps)
 
-def _own_events(tracks: Sequence[Tracks]) -> dict[str, int]:
-    """Returns by kind the frame from which on events are the tracker's own."""
-    found = dict.fromkeys(tracks[0].own_events, 1)
-    for t in tracks:
+    def add(self, tracks: Sequence[Tracks]) -> list[Tracks]:
+        """Returns tracks of the next frames, in order, with groups and events."""
+        out, low = list[Tracks](), 0
+        while low < len(tracks):
+            # people are forgotten at certain frames, however many are added at once
+            high = min(len(tracks), low + self.block - self.end % self.block)
+            out += self._block(tracks[low:high])
+            low = high
+            if self.end % self.block == 0:
+                self._forget(self.end - self.block)
+        return out
+
+    def rest(self) -> tuple[GroupEvent, ...]:
+        """Returns the crossings and queues that are reported in the last frame because the recording ends there."""
+        if self.objective or not self.end:
+            return ()
+        found = [*self.crossings.rest(self.history), *self.queues.rest()]
+        found = [replace(e, emitted=self.end, pos=self._scaled(e.pos)) for e in found]
+        return tuple(e for e in found if self.end < self.own.get(e.kind, math.inf))
+
+    def ended(self, tracks: list[Tracks]) -> list[Tracks]:
+        """Returns tracks of which the last are those of the last frame, with all events that end there."""
+        more = self.rest()
+        if not more:
+            return tracks
+        last = tracks[-1]
+        more = more if self.places is None else moved_events(more, last.id, last.pos)
+        own = len(last.events) - self.added
+        events = *last.events[:own], *_in_order([*last.events[own:], *more])
+        return [*tracks[:-1], last.replace(events=events)]
+
+    def _block(self, tracks: Sequence[Tracks]) -> list[Tracks]:
+        tracks = self.velocities.add([self._as_named(t) for t in tracks])
+        first, self.end = self.end, tracks[-1].index
+        self.scale = self.px_per_m if tracks[0].plane == "image" and self.places is None else 1.0
+        rows = people_rows(tracks, self.scale, None if self.places is None else self.places(tracks))
+        if self.places is not None:
+            rows = replace(rows, vel=self.place_velocities.add(rows.frame, rows.id, rows.pos))
+        column = self._columns(rows)
+        events = list[GroupEvent]()
+        changes = not self.named or self.own.get("merge", math.inf) > 1
+        if changes or not self.objective:
+            steady, found = self._found(rows, column)
+            self.history.add(steady, self.end)
+            group = rows.group
+            if changes:
+                group, events = self._labelled(rows, steady, column, found)
+            self.history.label(group, first)
+            rows, steady = replace(rows, group=group), replace(steady, group=group)
+            events += [] if self.objective else self._crossings_and_queues(steady)
+        events = [e for e in events if (e.emitted or e.start) < self.own.get(e.kind, math.inf)]
+        events = [replace(e, pos=self._scaled(e.pos)) for e in events]
+        return self._filled(tracks, rows, events)
+
+    def _as_named(self, t: Tracks) -> Tracks:
+        """Returns the tracks of the next frame, without groups that the tracker names later than its first people."""
+        if not self.own and not self.end:
+            self.own = dict.fromkeys(t.own_events, 1)
         for event in t.events:
-            found.setdefault(event.kind, t.index)
-    membership = [frame for kind, frame in found.items() if kind in MEMBERSHIP_KINDS]
-    return {**found, **(dict.fromkeys(MEMBERSHIP_KINDS, min(membership)) if membership else {})}
+            self.own.setdefault(event.kind, t.index)
+        membership = [frame for kind, frame in self.own.items() if kind in MEMBERSHIP_KINDS]
+        self.own |= dict.fromkeys(MEMBERSHIP_KINDS, min(membership)) if membership else {}
+        if self.named is None and (len(t.id) or t.groups is not None):
+            self.named = _has_groups(t)
+        late = not self.named and _has_groups(t)
+        return t.replace(group=np.full(len(t.id), -1), groups=None) if late else t
+
+    def _columns(self, rows: PeopleRows) -> Ints:
+        """Returns the person of each row, (R,), as a row of `ids`; adds those who are new."""
+        new = np.setdiff1d(rows.id, self.ids)
+        if len(new):
+            every = np.union1d(self.ids, new)
+            place = np.searchsorted(self.ids, every)
+            self._take_people(np.where(np.append(self.ids, -1)[place] == every, place, -1), every)
+        column = np.searchsorted(self.ids, rows.id)
+        np.maximum.at(self.last, column, rows.frame)
+        return column
+
+    def _take_people(self, rows: Ints, ids: Ints) -> None:
+        self.ids, self.last = ids, np.append(self.last, -1)[rows]
+        self.finder.take_people(rows)
+        self.steady.take(rows)
+
+    def _forget(self, before: int) -> None:
+        """Forgets whoever was not seen since a frame."""
+        kept = np.flatnonzero(self.last >= before)
+        self._take_people(kept, self.ids[kept])
+        self.finder.forget(before)
+        people = {*self.ids.tolist()}
+        self.labels.forget(people)
+        self.queues.forget(before)
+        self.crossings.forget({*self.labels.shown})
+        self.history.forget(min(before, self.crossings.first), people)
+
+    def _found(self, rows: PeopleRows, column: Ints) -> tuple[PeopleRows, FoundGroups]:
+        """Returns the rows at the places that are most likely where positions err (only so does a person who stands
+        still not come and go), and the groups that the grouping finds."""
+        found = self.finder.add(rows, column, self.end)
+        if found.steps is None:
+            return rows, found
+        pos, seen = rows.pos.copy(), rows.seen
+        steps = found.steps.seen, found.steps.motion.noise
+        pos[seen] = self.steady.add(rows.frame[seen], column[seen], rows.pos[seen], *steps)
+        moved = (pos != rows.pos).any(axis=1)
+        vel = self.steady_velocities.add(rows.frame, rows.id, pos)
+        return replace(rows, pos=pos, vel=np.where(moved[:, None], vel, rows.vel)), found
+
+    def _labelled(
+        self, rows: PeopleRows, steady: PeopleRows, column: Ints, found: FoundGroups
+    ) -> tuple[Ints, list[GroupEvent]]:
+        """Returns the group ids of the rows, and the membership events by the motion of steady places."""
+        motion = TrackedMotion(self.history, self.fps)
+        group, events = self.labels.add(rows.frame, column, self.ids, motion, found, self.end)
+        if not self.named:
+            return group, events
+        # As long as a tracker's groups equal those of the grouping, the grouping's events are used: their onsets are
+        # dated back.
+        other = rows.frame[group != rows.group]
+        there = np.isfinite(steady.pos).all(axis=1)
+        named = steady.frame[there], steady.id[there], rows.group[there]
+        changes = self.changes.add(*named, self.history, self.end)
+        if not self.same:
+            return rows.group, changes
+        self.same = not len(other)
+        equal = int(other[0]) if len(other) else self.end
+        early = [e for e in events if (e.emitted or e.start) <= equal]
+        return rows.group, early + [e for e in changes if (e.emitted or e.start) > equal]
+
+    def _crossings_and_queues(self, rows: PeopleRows) -> list[GroupEvent]:
+        after = _known_after(self.fps)
+        met = self.crossings.add(rows.frame, rows.id, rows.pos, rows.group, self.history, self.end)
+        lined = self.queues.add(rows.frame, rows.id, rows.pos, rows.vel, rows.group, self.end)
+        return [replace(e, emitted=e.end + after[e.kind]) for e in (*met, *lined)]
+
+    def _filled(self, tracks: Sequence[Tracks], rows: PeopleRows, events: Sequence[GroupEvent]) -> list[Tracks]:
+        cuts = np.searchsorted(rows.frame, [t.index - 1 for t in tracks] + [tracks[-1].index])
+        by_frame: dict[int, list[GroupEvent]] = {}
+        for event in events:
+            by_frame.setdefault(event.emitted or event.start, []).append(event)
+        labels = []
+        for k, t in enumerate(tracks):
+            r = slice(int(cuts[k]), int(cuts[k + 1]))
+            labels.append(rows.group[r][np.searchsorted(rows.id[r], t.id)])
+        every = groups_in_frames(tracks, self.scale, labels, shapes=not self.objective)
+        out = []
+        for t, own, groups in zip(tracks, labels, every, strict=True):
+            new: Sequence[GroupEvent] = _in_order(by_frame.pop(t.index, ()))
+            if self.places is not None:
+                new = moved_events(new, t.id, t.pos)
+            named = t.groups if self.named else None
+            out.append(t.replace(group=own, events=(*t.events, *new), groups=named or groups, derived=True))
+            self.added = len(new)
+        return out
+
+    def _scaled(self, pos: tuple[float, float]) -> tuple[float, float]:
+        return pos[0] * self.scale, pos[1] * self.scale
 
 
-def _steady(table: TracksTable, fps: float) -> TracksTable:
-    """Returns the table with the places and velocities that are most likely where positions err (`steady_places`): only
-    so does a person who stands still not come and go."""
-    rows = table.seen if table.seen is not None else np.ones(len(table.frame), bool)
-    pos = table.pos.copy()
-    pos[rows] = steady_places(table.frame[rows], table.column[rows], table.pos[rows], table.length, fps)
-    moved = (pos != table.pos).any(axis=1)
-    vel = np.where(moved[:, None], chords(table.frame, table.id, pos, fps), table.vel)
-    return replace(table, pos=pos, vel=vel)
+def _in_order(events: Iterable[GroupEvent]) -> list[GroupEvent]:
+    return sorted(events, key=lambda e: (e.start, e.end, e.kind, e.members, e.after))
 
 
-def _grouped(
-    table: TracksTable, steady: TracksTable, named: bool, fps: float, rule: Grouping
-) -> tuple[Ints, list[GroupEvent]]:
-    """Returns the group ids of the table's rows, and the membership events by the motion of steady places."""
-    if named and (table.group < 0).all():
-        return table.group, []
-    found = find_groups(table, fps, rule)
-    motion = TrackedMotion(steady.motion(), fps, steady.measured_motion())
-    group, events = label_people(table.frame, table.column, motion, found, rule)
-    if not named:
-        return group, events
-    # As long as a tracker's groups equal those of the grouping, the grouping's events are used: their onsets are dated
-    # back.
-    other = table.frame[group != table.group]
-    equal = int(other[0]) if len(other) else table.length
-    changes = events_of_labels(motion.rows) if len(other) else []
-    early = [e for e in events if (e.emitted or e.start) <= equal]
-    return table.group, early + [e for e in changes if (e.emitted or e.start) > equal]
+def moved_events(events: Sequence[GroupEvent], id: Ints, pos: Array) -> tuple[GroupEvent, ...]:
+    """Returns the events with each `pos` replaced by the mean position of its members in one frame, nan if none is. id
+    (N,), pos (N, 2): ids and positions of the people in that frame."""
+    return tuple(replace(e, pos=_centre(pos, np.isin(id, e.members))) for e in events)
 
 
-def _crossings_and_queues(table: TracksTable, fps: float) -> list[GroupEvent]:
-    motion = table.motion()
-    after = _known_after(fps)
-    found = [*crossings(motion, fps), *queues(motion, fps)]
-    return [replace(e, emitted=min(e.end + after[e.kind], table.length)) for e in found]
+def _centre(pos: Array, rows: Bools) -> tuple[float, float]:
+    x, y = pos[rows].mean(axis=0) if rows.any() else (float("nan"), float("nan"))
+    return float(x), float(y)
 
 
 def _known_after(fps: float) -> dict[str, int]:
@@ -203,39 +357,6 @@ def events_at_end(reported: Sequence[Tracks], filled: Sequence[Tracks], fps: flo
         return 0
     after, last, own = _known_after(fps), filled[-1], len(reported[-1].events)
     return sum(e.kind in after and e.end + after[e.kind] > last.index for e in last.events[own:])
-
-
-def filled(
-    tracks: Sequence[Tracks], labels: Sequence[Ints], events: Sequence[tuple[GroupEvent, ...]], px_per_m: float = 1.0,
-    *, objective: bool = False,
-) -> list[Tracks]:  # fmt: skip
-    """Returns the tracks with these group ids and further events, and with groups that follow from the ids unless the
-    tracker names groups. labels, events: of each `Tracks`. px_per_m, objective: as of `derive`."""
-    named, every = names_groups(tracks), groups_in_frames(tracks, px_per_m, labels, shapes=not objective)
-    return [
-        t.replace(group=own, events=(*t.events, *new), groups=(t.groups if named else None) or groups, derived=True)
-        for t, own, new, groups in zip(tracks, labels, events, every, strict=True)
-    ]
-
-
-def _of_frames(
-    tracks: Sequence[Tracks], table: TracksTable, events: Sequence[GroupEvent]
-) -> tuple[list[Ints], list[tuple[GroupEvent, ...]]]:
-    cuts = np.searchsorted(table.frame, np.arange(table.length + 1)).tolist()
-    by_frame: dict[int, list[GroupEvent]] = {}
-    for event in events:
-        by_frame.setdefault(event.emitted or event.start, []).append(_with_track_ids(event, table))
-    labels = []
-    for t in tracks:
-        r = slice(cuts[t.index - 1], cuts[t.index])
-        labels.append(table.group[r][np.searchsorted(table.id[r], t.id)])
-    every = (by_frame.pop(t.index, ()) for t in tracks)
-    return labels, [tuple(sorted(new, key=lambda e: (e.start, e.end, e.kind, e.members, e.after))) for new in every]
-
-
-def _with_track_ids(event: GroupEvent, table: TracksTable) -> GroupEvent:
-    x, y = (v * table.scale for v in event.pos)
-    return replace(event, members=tuple(int(table.ids[p - 1]) for p in event.members), pos=(x, y))
 
 
 def groups_in_frames(

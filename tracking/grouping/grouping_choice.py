@@ -1,17 +1,19 @@
 """Which grouping makes the groups of tracked people: the belief (the default) or the baseline rule, with parameters.
 
-`grouping_of` reads what a user names: "rule", "belief", or a TOML file of either. `find_groups` applies it.
+`grouping_of` reads what a user names: "rule", "belief", or a TOML file of either. `group_finder` applies it.
 """
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Protocol
 
 from scenarios.loading.toml_files import parse
+from sim.types import Ints
 from tracking.grouping.belief import KIND, Belief, default_belief
-from tracking.grouping.belief_groups import FoundGroups, belief_groups
-from tracking.grouping.link_rule import LinkRule, find_links
-from tracking.grouping.tracks_table import TracksTable
+from tracking.grouping.belief_groups import BeliefGroups, FoundGroups
+from tracking.grouping.link_rule import LinkRule, RuleLinks
+from tracking.grouping.motion_history import PeopleRows
 
 Grouping = LinkRule | Belief
 
@@ -30,8 +32,38 @@ def grouping_of(source: str | Path) -> Grouping:
     return Belief.from_toml(source) if "grouping" in parse(Path(source)) else LinkRule.from_toml(source)
 
 
-def find_groups(table: TracksTable, fps: float, grouping: Grouping) -> FoundGroups:
-    """Returns the groups of the people of a table, by the rule or the belief."""
-    if isinstance(grouping, Belief):
-        return belief_groups(table.frame, table.column, table.pos, table.length, fps, grouping, table.seen)
-    return FoundGroups(find_links(table.frame, table.column, table.pos, table.vel, table.length, fps, grouping))
+class GroupFinder(Protocol):
+    """Finds the groups of people, frame by frame."""
+
+    def add(self, rows: PeopleRows, column: Ints, end: int) -> FoundGroups:
+        """Adds the frames up to `end`, and returns the groups in them. column (R,): the person of each row, from 0."""
+
+    def take_people(self, rows: Ints) -> None:
+        """Renumbers the people, who keep their order: person k becomes who was person rows[k], or somebody new if
+        rows[k] is -1."""
+
+    def forget(self, before: int) -> None:
+        """Forgets the pairs of people who were last near each other before a frame."""
+
+
+def group_finder(grouping: Grouping, fps: float) -> GroupFinder:
+    """Returns the finder of groups by the rule or the belief."""
+    return BeliefGroups(fps, grouping) if isinstance(grouping, Belief) else RuleGroups(fps, grouping)
+
+
+class RuleGroups:
+    """Finds groups by the baseline rule. State: links."""
+
+    def __init__(self, fps: float, rule: LinkRule) -> None:
+        self.links = RuleLinks(fps, rule)
+
+    def add(self, rows: PeopleRows, column: Ints, end: int) -> FoundGroups:
+        """Adds frames, as `GroupFinder.add`."""
+        return FoundGroups(self.links.add(rows.frame, column, rows.pos, rows.vel, end))
+
+    def take_people(self, rows: Ints) -> None:
+        """Renumbers the people, as `GroupFinder.take_people`."""
+        self.links.take_people(rows)
+
+    def forget(self, before: int) -> None:
+        """Does nothing: the rule does not look back for long."""

@@ -67,39 +67,78 @@ class Links:
     sure: Bools
 
 
-def find_links(frame: Ints, column: Ints, pos: Array, vel: Array, length: int, fps: float, rule: LinkRule) -> Links:
-    """Returns all switches of links in a sequence of `length` frames. frame, column (R,), from 0, pos, vel (R, 2), m,
-    m/s: one row per person and frame, frame sorted. A pair with an unknown (nan) velocity counts as moving alike."""
-    i, j = close_pairs(frame, pos, max(rule.apart, rule.near))
-    swap = column[i] > column[j]
-    i, j = np.where(swap, j, i), np.where(swap, i, j)
-    distance = np.hypot(*(pos[i] - pos[j]).T)
-    differ = np.hypot(*(vel[i] - vel[j]).T)
-    near = (distance < rule.near) & ~(differ >= rule.alike)  # true where nan: a velocity is unknown
-    speed = np.hypot(*vel.T)
-    near &= ~(np.maximum(speed[i], speed[j]) < rule.idle)
-    people = int(column.max(initial=0)) + 1
-    # keys of two pairs, or two people, are further apart than the times of the rule
-    span = length + max(frames_of(rule.window, fps), frames_of(rule.patience, fps))
-    key = (column[i] * people + column[j]) * span + frame[i]
-    together, within = np.sort(key[near]), np.sort(key[distance <= rule.apart])
-    found = [
-        _switches(both, _among(together, both), ~_among(within, both), span, fps, rule)
-        for both in _both_seen(np.unique(together // span), np.sort(column * span + frame), people, span)
-    ]
-    key, on = (np.concatenate(x) for x in zip(*found, strict=True))
-    pair, t = key // span, key % span
-    order = np.lexsort((pair, t))
-    t, pair, on = t[order], pair[order], on[order]
-    return Links(t, pair // people, pair % people, on, np.ones(len(t), bool))
+class RuleLinks:
+    """Finds the links between people by the rule, frame by frame.
+
+    State: a, b (L,): the pairs that are linked, sorted; frame, column, pos, vel: rows of the times that the rule looks
+    back. People are numbers, which `take_people` changes.
+    """
+
+    def __init__(self, fps: float, rule: LinkRule) -> None:
+        self.fps, self.rule, self.people, self.end = fps, rule, 0, 0
+        self.back = max(frames_of(rule.window, fps), frames_of(rule.patience, fps))
+        self.a, self.b = np.zeros((2, 0), np.int64)
+        self.frame, self.column = np.zeros((2, 0), np.int64)
+        self.pos, self.vel = np.zeros((2, 0, 2))
+
+    def take_people(self, rows: Ints) -> None:
+        """Renumbers the people, who keep their order: person k becomes who was person rows[k], or somebody new if
+        rows[k] is -1."""
+        place = np.full(self.people + 1, -1)
+        place[rows[rows >= 0]] = np.flatnonzero(rows >= 0)
+        self.people, self.column = len(rows), place[self.column]
+        there = (place[self.a] >= 0) & (place[self.b] >= 0)
+        self.a, self.b = place[self.a[there]], place[self.b[there]]
+
+    def add(self, frame: Ints, column: Ints, pos: Array, vel: Array, end: int) -> Links:
+        """Adds the frames up to `end`, and returns all switches of links in them. frame, column (R,), from 0, pos, vel
+        (R, 2), m, m/s: one row per person and frame, frame sorted. A pair with an unknown (nan) velocity counts as
+        moving alike."""
+        rule, fps, people, first = self.rule, self.fps, max(self.people, 1), self.end
+        frame, column = np.append(self.frame, frame), np.append(self.column, column)
+        pos, vel = np.concatenate([self.pos, pos]), np.concatenate([self.vel, vel])
+        i, j = close_pairs(frame, pos, max(rule.apart, rule.near))
+        swap = column[i] > column[j]
+        i, j = np.where(swap, j, i), np.where(swap, i, j)
+        distance = np.hypot(*(pos[i] - pos[j]).T)
+        differ = np.hypot(*(vel[i] - vel[j]).T)
+        near = (distance < rule.near) & ~(differ >= rule.alike)  # true where nan: a velocity is unknown
+        speed = np.hypot(*vel.T)
+        near &= ~(np.maximum(speed[i], speed[j]) < rule.idle)
+        # keys of two pairs, or two people, are further apart than the times of the rule
+        span = end + self.back
+        key = (column[i] * people + column[j]) * span + frame[i]
+        together, within = np.sort(key[near]), np.sort(key[distance <= rule.apart])
+        linked = self.a * people + self.b
+        pairs = np.union1d(together // span, linked)
+        # only those can be linked or parted who are both seen
+        found = [
+            _switches(both, _among(together, both), ~_among(within, both), span, fps, rule, first, linked)
+            for both in _both_seen(pairs, np.sort(column * span + frame), people, span)
+        ]
+        key, on = (np.concatenate(x) for x in zip((np.zeros(0, np.int64), np.zeros(0, bool)), *found, strict=True))
+        pair, t = key // span, key % span
+        order = np.lexsort((pair, t))
+        t, pair, on = t[order], pair[order], on[order]
+        latest = np.unique(pair[::-1], return_index=True)
+        ended = latest[0][~on[::-1][latest[1]]]
+        linked = np.setdiff1d(np.union1d(linked, latest[0]), ended)
+        self.a, self.b = divmod(linked, people)
+        late = frame >= end - self.back
+        self.frame, self.column, self.pos, self.vel, self.end = frame[late], column[late], pos[late], vel[late], end
+        return Links(t, pair // people, pair % people, on.astype(bool), np.ones(len(t), bool))
 
 
 def _both_seen(pairs: Ints, seen: Ints, people: int, span: int) -> Iterator[Ints]:
     """Yields the keys, pair * span + frame, of all frames in which both of a pair were seen, in portions of whole
     pairs. seen (R,): person * span + frame of each row, ascending."""
     a, b = pairs // people, pairs % people
-    begin = np.maximum(*(seen[np.searchsorted(seen, p * span)] % span for p in (a, b)))
-    end = np.minimum(*(seen[np.searchsorted(seen, (p + 1) * span) - 1] % span for p in (a, b)))
+    low, high = (np.searchsorted(seen, p * span) for p in (a, b)), (np.searchsorted(seen, (p + 1) * span) for p in (a, b))
+    (low_a, low_b), (high_a, high_b) = low, high
+    there = (low_a < high_a) & (low_b < high_b)
+    pairs, a, b = pairs[there], a[there], b[there]
+    begin = np.maximum(seen[low_a[there]] % span, seen[low_b[there]] % span)
+    end = np.minimum(seen[high_a[there] - 1] % span, seen[high_b[there] - 1] % span)
     low, high = np.searchsorted(seen, a * span + begin), np.searchsorted(seen, a * span + end, side="right")
     portion = np.cumsum(high - low) // CELLS
     for some in np.split(np.arange(len(pairs)), np.flatnonzero(np.diff(portion)) + 1):
@@ -114,18 +153,26 @@ def _among(values: Ints, wanted: Ints) -> Bools:
     return np.asarray(np.append(values, -1)[np.searchsorted(values, wanted)] == wanted)
 
 
-def _switches(key: Ints, near: Bools, far: Bools, span: int, fps: float, rule: LinkRule) -> tuple[Ints, Bools]:
-    """Returns key and on of the switches (S,) of pairs. key (Q,): of each pair and frame in which both were seen,
-    ascending; near, far (Q,): whether the pair is near and moves alike, and whether it is apart."""
+def _switches(
+    key: Ints, near: Bools, far: Bools, span: int, fps: float, rule: LinkRule, first: int, linked: Ints
+) -> tuple[Ints, Bools]:
+    """Returns key and on of the switches (S,) of pairs from frame `first` on. key (Q,): of each pair and frame in which
+    both were seen, ascending; near, far (Q,): whether the pair is near and moves alike, and whether it is apart.
+    linked: the pairs that are linked before."""
     window, patience = frames_of(rule.window, fps), frames_of(rule.patience, fps)
     seen, alike = _recent(key, np.ones_like(near), window), _recent(key, near, window)
     on = (seen >= min(frames_of(rule.acquaintance, fps), window)) & (alike >= rule.share * seen) & (alike > 0)
     off = _recent(key, far, patience) >= patience
+    late = key % span >= first
+    key, on, off = key[late], on[late], off[late]
     row, new = np.arange(len(key)), np.diff(key // span, prepend=-1) != 0
     last = np.maximum.accumulate(np.where(on | off | new, row, 0))
-    state = on[last]
-    before = np.append(False, state)[:-1] & ~new
-    changed = state != before
+    before = _among(linked, key // span)
+    # of a pair's first row, without a switch, the state before holds
+    value = np.where(on, True, np.where(off, False, new & before))
+    state = value[last]
+    former = np.where(new, before, np.append(False, state)[:-1])
+    changed = state != former
     return key[changed], state[changed]
 
 

@@ -165,37 +165,53 @@ def file_ends(
 
 
 @njit(cache=True)
-def filter_places(person: Ints, time: Array, pos: Array, errors: Array, spread: float) -> Array:
-    """Returns the places (R, 2) of a Kalman filter for each axis by itself, rows sorted by person, then time.
+def filter_places(
+    frame: Ints, person: Ints, pos: Array, step: Ints, walker: Ints, variance: Array, size: int, fps: float,
+    spread: float, times: float, noise: Array, latest: Array, state: Array, cov: Array, last: Ints, out: Array,
+) -> None:  # fmt: skip
+    """Writes the places (R, 2) of a Kalman filter for each axis by itself, rows sorted by frame.
 
-    errors (R, 2): variances of pos, m². spread: by how much a velocity changes in 1 s, m/s. A row without position
-    keeps it unknown.
+    frame, person (R,), pos (R, 2), m: a row without position keeps it unknown. step, walker (S,), ascending, variance
+    (S, 2), m²: noise of each person's positions after steps of `size` frames; `times` as much is expected. spread: by
+    how much a velocity changes in 1 s, m/s. State: noise (K, 2), of each person, nan if unknown, and latest (2,), of
+    whoever was seen last; state (K, 2, 2), cov (K, 2, 3), and the frame, last (K,), of a person's last row, -1: none.
     """
-    out, state, cov = pos.copy(), np.zeros((2, 2)), np.zeros((2, 3))
-    last = -1
+    n = 0
     for r in range(len(person)):
+        # the noise of the last step that is over when the frame comes
+        over = (frame[r] - 1) // size
+        while n < len(step) and step[n] <= over:
+            noise[walker[n]] = variance[n]
+            latest[:] = variance[n]
+            n += 1
         if np.isnan(pos[r, 0]):
             continue
-        if last < 0 or person[last] != person[r]:
+        k = person[r]
+        errors = latest if np.isnan(noise[k, 0]) else noise[k]
+        if last[k] < 0:
             for d in range(2):
-                state[d, 0], state[d, 1] = pos[r, d], 0.0
-                cov[d, 0], cov[d, 1], cov[d, 2] = errors[r, d], 0.0, FASTEST * FASTEST
+                error = times * errors[d]
+                state[k, d, 0], state[k, d, 1] = pos[r, d], 0.0
+                cov[k, d, 0], cov[k, d, 1], cov[k, d, 2] = error, 0.0, FASTEST * FASTEST
         else:
-            t = time[r] - time[last]
+            t = frame[r] / fps - last[k] / fps
             for d in range(2):
                 q = spread * spread * t
-                state[d, 0] += t * state[d, 1]
-                cov[d, 0] += t * (2 * cov[d, 1] + t * cov[d, 2]) + q * t * t / 3
-                cov[d, 1] += t * cov[d, 2] + q * t / 2
-                cov[d, 2] += q
-                whole = cov[d, 0] + errors[r, d]
+                state[k, d, 0] += t * state[k, d, 1]
+                cov[k, d, 0] += t * (2 * cov[k, d, 1] + t * cov[k, d, 2]) + q * t * t / 3
+                cov[k, d, 1] += t * cov[k, d, 2] + q * t / 2
+                cov[k, d, 2] += q
+                whole = cov[k, d, 0] + times * errors[d]
                 if whole > 0:
-                    gain, drift, off = cov[d, 0] / whole, cov[d, 1] / whole, pos[r, d] - state[d, 0]
-                    state[d, 0] += gain * off
-                    state[d, 1] += drift * off
-                    cov[d, 2] -= drift * cov[d, 1]
-                    cov[d, 1] -= gain * cov[d, 1]
-                    cov[d, 0] -= gain * cov[d, 0]
-        out[r, 0], out[r, 1] = state[0, 0], state[1, 0]
-        last = r
-    return out
+                    gain, drift, off = cov[k, d, 0] / whole, cov[k, d, 1] / whole, pos[r, d] - state[k, d, 0]
+                    state[k, d, 0] += gain * off
+                    state[k, d, 1] += drift * off
+                    cov[k, d, 2] -= drift * cov[k, d, 1]
+                    cov[k, d, 1] -= gain * cov[k, d, 1]
+                    cov[k, d, 0] -= gain * cov[k, d, 0]
+        out[r, 0], out[r, 1] = state[k, 0, 0], state[k, 1, 0]
+        last[k] = frame[r]
+    while n < len(step):
+        noise[walker[n]] = variance[n]
+        latest[:] = variance[n]
+        n += 1

@@ -17,13 +17,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
+from typing import Protocol
 
 import numpy as np
 
 from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_VELOCITY, close_pairs
 from sim.types import Array, Bools, Ints
 from tracking.grouping import person_motion
-from tracking.grouping.person_motion import CORRELATION, Motion, PersonMotion, StepRows
+from tracking.grouping.person_motion import CORRELATION, Motion, PersonMotion, StepRows, taken
 
 REACH = 4.0  # m: pairs farther apart have no evidence.
 STANDING = 0.3  # m/s.
@@ -78,17 +79,81 @@ class PairRows:
 def evidence(seen: StepRows, seconds: float) -> Iterator[PairRows]:
     """Yields the evidence of all pairs within 4 m, in portions of whole steps, steps ascending. seconds: length of a
     step."""
-    people, step, column = int(seen.column.max(initial=0)) + 1, seen.step, seen.column
-    motion = PersonMotion(people, seconds).add(step, column, seen.pos, seen.time)
-    i, j = close_pairs(step, seen.pos, REACH)
-    pair = np.unique(column[i] * people + column[j], return_inverse=True)[1]
-    order = np.lexsort((pair, step[i]))
-    i, j, pair = i[order], j[order], pair[order]
-    means = PairMeans(int(pair.max(initial=-1)) + 1, seconds)
-    for r in _portions(step[i]):
-        moment = pair_moment(seen.pos, motion, i[r], j[r])
-        values = means.add(step[i[r]], pair[r], moment)
-        yield PairRows(step[i[r]], column[i[r]], column[j[r]], pair[r], values, moment.noise_level)
+    history = PairHistory(seconds)
+    history.take_people(np.full(int(seen.column.max(initial=-1)) + 1, -1))
+    yield from history.add(seen)[1]
+
+
+class Follower(Protocol):
+    """What is known of pairs, by number."""
+
+    def take(self, rows: Ints) -> None:
+        """Renumbers the pairs: pair k becomes what was pair rows[k], or a new one if rows[k] is -1."""
+
+
+class PairHistory:
+    """The evidence of pairs so far. seconds: length of a step. followers: further facts of pairs, by number.
+
+    State: motion, of K people; a, b (P,): the people of each pair, sorted by a, then b; means, of the pairs.
+    """
+
+    def __init__(self, seconds: float, *followers: Follower) -> None:
+        self.seconds, self.people = seconds, 0
+        self.motion, self.means = PersonMotion(0, seconds), PairMeans(0, seconds)
+        self.followers = (self.means, *followers)
+        self.a, self.b = np.zeros((2, 0), np.int64)
+
+    def take_people(self, rows: Ints) -> None:
+        """Renumbers the people: person k becomes who was person rows[k], or somebody new if rows[k] is -1. Those who
+        stay keep their order."""
+        place = np.full(self.people + 1, -1)
+        place[rows[rows >= 0]] = np.flatnonzero(rows >= 0)
+        self.motion.take(rows)
+        self.people = len(rows)
+        a, b = place[self.a], place[self.b]
+        kept = np.flatnonzero((a >= 0) & (b >= 0))
+        self.a, self.b = a[kept], b[kept]
+        if len(kept) < len(a):
+            self._take(kept)
+
+    def add(self, seen: StepRows) -> tuple[Motion, Iterator[PairRows]]:
+        """Adds the people of some steps, and returns their motion and the evidence of all pairs within 4 m, in portions
+        of whole steps, steps ascending; all portions must be taken."""
+        step, column = seen.step, seen.column
+        motion = self.motion.add(step, column, seen.pos, seen.time)
+        return motion, self._pairs(seen, motion)
+
+    def _pairs(self, seen: StepRows, motion: Motion) -> Iterator[PairRows]:
+        step, column = seen.step, seen.column
+        i, j = close_pairs(step, seen.pos, REACH)
+        pair = self._numbers(column[i], column[j])
+        order = np.lexsort((pair, step[i]))
+        i, j, pair = i[order], j[order], pair[order]
+        for r in _portions(step[i]):
+            moment = pair_moment(seen.pos, motion, i[r], j[r])
+            values = self.means.add(step[i[r]], pair[r], moment)
+            yield PairRows(step[i[r]], column[i[r]], column[j[r]], pair[r], values, moment.noise_level)
+
+    def forget(self, step: int) -> None:
+        """Forgets the pairs who were last near each other before a step."""
+        kept = np.flatnonzero(self.means.last >= step)
+        self.a, self.b = self.a[kept], self.b[kept]
+        self._take(kept)
+
+    def _numbers(self, a: Ints, b: Ints) -> Ints:
+        """Returns the numbers (R,) of pairs a < b; adds those that are new."""
+        old, key = self.a * self.people + self.b, a * self.people + b
+        if not np.isin(key, old).all():
+            every = np.union1d(old, key)
+            place = np.searchsorted(old, every)
+            self._take(np.where(np.append(old, -1)[place] == every, place, -1))
+            self.a, self.b = divmod(every, max(self.people, 1))
+            old = every
+        return np.searchsorted(old, key)
+
+    def _take(self, rows: Ints) -> None:
+        for facts in self.followers:
+            facts.take(rows)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -232,12 +297,8 @@ class PairMeans:
 
     def take(self, rows: Ints) -> None:
         """Renumbers the pairs: pair k becomes what was pair rows[k], or a new pair without past if rows[k] is -1."""
-        new = rows < 0
         for name in ("total", "weight", "offsets", "last", "rows"):
-            table = getattr(self, name)
-            taken = np.zeros((len(rows), *table.shape[1:]), table.dtype)
-            taken[~new] = table[rows[~new]]
-            setattr(self, name, taken)
+            setattr(self, name, taken(getattr(self, name), rows, 0))
 
 
 def _noise_shares() -> Array:

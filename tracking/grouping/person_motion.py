@@ -40,14 +40,14 @@ class StepRows:
     time: Array  # (R,): mean time in the step, s
 
 
-def step_rows(frame: Ints, column: Ints, pos: Array, length: int, fps: float) -> StepRows:
-    """Returns each person's mean position and time in each step.
+def step_rows(frame: Ints, column: Ints, pos: Array, end: int, fps: float) -> StepRows:
+    """Returns each person's mean position and time in each step that is complete before frame `end`.
 
     frame, column (R,), from 0, pos (R, 2), m: one row per person and frame. With n = `frames_per_step(fps)`, step s
-    ends with frame n s, so that step 0 is frame 0 alone. Frames after the last complete step are left out.
+    ends with frame n s, so that step 0 is frame 0 alone.
     """
     size = frames_per_step(fps)
-    steps, step, people = -(-length // size), -(-frame // size), int(column.max(initial=0)) + 1
+    steps, step, people = -(-end // size), -(-frame // size), int(column.max(initial=0)) + 1
     whole = step < steps
     key, row, count = np.unique((step * people + column)[whole], return_inverse=True, return_counts=True)
     total = np.stack([np.bincount(row, x[whole], len(key)) for x in (*pos.T, frame / fps)], axis=-1)
@@ -102,37 +102,45 @@ class PersonMotion:
 
     def take(self, rows: Ints) -> None:
         """Renumbers the people: person k becomes who was person rows[k], or somebody new if rows[k] is -1."""
-        new = rows < 0
         for name, empty in (("recent", -np.inf), ("sums", 0.0), ("spread", 0.0)):
-            table = getattr(self, name)
-            taken = np.full((len(rows), *table.shape[1:]), empty)
-            taken[~new] = table[rows[~new]]
-            setattr(self, name, taken)
+            setattr(self, name, taken(getattr(self, name), rows, empty))
 
 
-def steady_places(frame: Ints, column: Ints, pos: Array, length: int, fps: float) -> Array:
-    """Returns where people are by a Kalman filter with their own noise, (R, 2), m: soon the same places if they are
-    exact.
+class SteadyPlaces:
+    """Where people are by a Kalman filter with their own noise: soon the same places if they are exact.
 
-    frame, column (R,), from 0, pos (R, 2), m: one row per person and frame, sorted by frame. People walk at nearly
-    constant velocity. Errors that are correlated over a time count as many times as often as they are alike.
+    People walk at nearly constant velocity. Errors that are correlated over a time count as many times as often as they
+    are alike. State (`motion_kernels.filter_places`): noise (K, 2), latest (2,), state (K, 2, 2), cov (K, 2, 3), last
+    (K,).
     """
-    from tracking.grouping.motion_kernels import filter_places
 
-    size = frames_per_step(fps)
-    seen, people = step_rows(frame, column, pos, length, fps), int(column.max(initial=0)) + 1
-    motion = PersonMotion(people, size / fps)
-    variance = np.maximum(motion.add(seen.step, seen.column, seen.pos, seen.time).noise[:, [0, 2]], 0.0)
-    variance = np.concatenate([variance, np.full((1, 2), FIRST[0] ** 2)])
-    order, steps = np.lexsort((seen.step, seen.column)), -(-length // size)
-    # of the last step that is over when the frame comes: the person's own, else that of whoever was seen last
-    over = (frame - 1) // size
-    own = np.searchsorted((seen.column * steps + seen.step)[order], column * steps + over, side="right") - 1
-    known = (over >= 0) & (np.append(seen.column[order], -1)[own] == column)
-    latest = np.searchsorted(seen.step, over, side="right") - 1
-    errors = variance[np.where(known, np.append(order, -1)[own], latest)]
-    stay = np.exp(-1 / (fps * CORRELATION))
-    errors *= (1 + stay) / (1 - stay)
-    out, order = np.empty_like(pos), np.lexsort((frame, column))
-    out[order] = filter_places(column[order], frame[order] / fps, pos[order], errors[order], STEADY)
-    return out
+    def __init__(self, fps: float) -> None:
+        self.fps, self.size = fps, frames_per_step(fps)
+        stay = np.exp(-1 / (fps * CORRELATION))
+        self.times = (1 + stay) / (1 - stay)
+        self.noise, self.latest = np.zeros((0, 2)), np.full(2, FIRST[0] ** 2)
+        self.state, self.cov, self.last = np.zeros((0, 2, 2)), np.zeros((0, 2, 3)), np.zeros(0, np.int64)
+
+    def add(self, frame: Ints, person: Ints, pos: Array, seen: StepRows, noise: Array) -> Array:
+        """Adds R rows, sorted by frame, and returns their places (R, 2), m. frame, person (R,), from 0, pos (R, 2), m.
+        seen, noise (S, 3): people in the steps that end in these frames, and the noise of their positions then."""
+        from tracking.grouping.motion_kernels import filter_places
+
+        out, variance = pos.copy(), np.maximum(noise[:, [0, 2]], 0.0)
+        filter_places(
+            frame, person, pos, seen.step, seen.column, variance, self.size, self.fps, STEADY, self.times,
+            self.noise, self.latest, self.state, self.cov, self.last, out,
+        )  # fmt: skip
+        return out
+
+    def take(self, rows: Ints) -> None:
+        """Renumbers the people, as `PersonMotion.take`."""
+        for name, empty in (("noise", np.nan), ("state", 0.0), ("cov", 0.0), ("last", -1)):
+            setattr(self, name, taken(getattr(self, name), rows, empty))
+
+
+def taken(table: Array, rows: Ints, empty: float) -> Array:
+    """Returns the rows (R,) of a table (K, ...); `empty` where a row is -1."""
+    found = np.full((len(rows), *table.shape[1:]), empty, table.dtype)
+    found[rows >= 0] = table[rows[rows >= 0]]
+    return found

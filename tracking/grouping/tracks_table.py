@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from scenarios.errors import InputError
-from sim.truth.motion_rows import MotionRows
 from sim.truth.velocities import chords
 from sim.types import Array, Bools, Ints, Tracks
+from tracking.grouping.motion_history import PeopleRows
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,18 +29,6 @@ class TracksTable:
     scale: float  # px per m by which pos and vel were divided if the tracks are in the image, else 1
     seen: Bools | None = None  # (R,): False where a person is reported by prediction only; None: all are seen
 
-    def motion(self) -> MotionRows:
-        """Returns the rows of known position, sorted by person, then frame."""
-        return MotionRows.of(self.frame, self.column, self.pos, self.vel, self.group, self.length)
-
-    def measured_motion(self) -> MotionRows | None:
-        """Returns the rows of `motion` in which people are measured; all rows of people who never are. None: `motion`
-        itself, as everybody is measured always."""
-        if self.seen is None or self.seen.all():
-            return None
-        known = self.seen | ~np.isin(self.column, self.column[self.seen])
-        return replace(self, pos=np.where(known[:, None], self.pos, np.nan)).motion()
-
 
 def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, places: Array | None = None) -> TracksTable:
     """Returns the table of a sequence's person tracks, one `Tracks` per frame, at least one.
@@ -50,27 +38,30 @@ def tabulate(tracks: Sequence[Tracks], fps: float, px_per_m: float, places: Arra
     image and px_per_m is not a finite number above 0.
     """
     scale = px_per_m if tracks[0].plane == "image" and places is None else 1.0
+    rows = people_rows(tracks, scale, places)
+    ids, column = np.unique(rows.id, return_inverse=True)
+    vel, unknown = rows.vel, np.asarray(np.isnan(rows.vel).any(axis=1))
+    if unknown.any():
+        vel = np.where(unknown[:, None], chords(rows.frame, rows.id, rows.pos, fps), vel)
+    length = int(max(t.index for t in tracks))
+    return TracksTable(rows.frame, rows.id, column, ids, rows.pos, vel, rows.group, length, scale, rows.seen)
+
+
+def people_rows(tracks: Sequence[Tracks], scale: float, places: Array | None) -> PeopleRows:
+    """Returns the rows of people of some frames, divided by `scale`; places: as of `tabulate`. Raises InputError if the
+    scale is not a finite number above 0."""
     if not math.isfinite(scale) or scale <= 0:
         raise InputError(
             place="px_per_m", got=f"{scale}", expected="a number above 0", remedy="give --px-per-m: tracks are in px"
         )
-    count = [len(t.id) for t in tracks]
-    frame = np.repeat(np.array([t.index for t in tracks], np.int64) - 1, count)
+    frame = np.repeat(np.array([t.index for t in tracks], np.int64) - 1, [len(t.id) for t in tracks])
     id, group = np.concatenate([t.id for t in tracks]), np.concatenate(_named_groups(tracks))
     if places is None:
         pos, vel = (np.concatenate([getattr(t, name)[:, :2] for t in tracks]) / scale for name in ("pos", "vel"))
     else:
         pos, vel = places, np.full_like(places, np.nan)
-    seen = np.concatenate([t.measured for t in tracks])
-    order = np.lexsort((id, frame))
-    seen = seen[order]
-    frame, id, group, pos, vel = frame[order], id[order], group[order], pos[order], vel[order]
-    ids, column = np.unique(id, return_inverse=True)
-    length = int(max(t.index for t in tracks))
-    unknown: Bools = np.asarray(np.isnan(vel).any(axis=1))
-    if unknown.any():
-        vel = np.where(unknown[:, None], chords(frame, id, pos, fps), vel)
-    return TracksTable(frame, id, column, ids, pos, vel, group, length, scale, seen)
+    rows = PeopleRows(frame, id, pos, vel, group, np.concatenate([t.measured for t in tracks]))
+    return rows.take(np.lexsort((id, frame)))
 
 
 def _named_groups(tracks: Sequence[Tracks]) -> list[Ints]:

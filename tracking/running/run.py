@@ -24,7 +24,7 @@ from tracking.running.time_limit import TimeLimited
 
 if TYPE_CHECKING:
     from tracking.export.tidy_tables import TidyTables
-    from tracking.grouping.belief import PairProbabilities
+    from tracking.grouping.pair_beliefs import PairProbabilities
 
 
 @dataclass(frozen=True, eq=False)

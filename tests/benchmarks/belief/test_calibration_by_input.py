@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.belief import calibration_by_input as calibration
 from tests import hand_made
-from tracking.grouping.belief import PairProbabilities
+from tracking.grouping.pair_beliefs import PairProbabilities
 from tracking.grouping.known_people import people_as_tracks
 
 

@@ -8,7 +8,7 @@ import pytest
 from scenarios.errors import InputError
 from tests import reference_belief as slow
 from tracking.grouping import pair_evidence
-from tracking.grouping.belief import FROZEN, Belief, default_belief, pair_beliefs
+from tracking.grouping.belief import FROZEN, Belief, default_belief
 from tracking.grouping.pair_evidence import NAMES, evidence
 from tracking.grouping.person_motion import StepRows
 

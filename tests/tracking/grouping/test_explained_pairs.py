@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from tests.near_pairs import table_of, walking
-from tracking.grouping.belief import beliefs_of_tracks, default_belief
+from tracking.grouping.belief import default_belief
+from tracking.grouping.pair_beliefs import beliefs_of_tracks
 from tracking.grouping.explained_pairs import VALUES, explain
 from tracking.grouping.pair_evidence import NAMES
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracking.grouping.belief import DECISIONS, UNSEEN, beliefs_of_tracks, default_belief
+from tracking.grouping.belief import DECISIONS, UNSEEN, default_belief
+from tracking.grouping.pair_beliefs import beliefs_of_tracks
 from tracking.grouping.online_belief import PairBelief
 
 FPS = 10.0

@@ -14,7 +14,8 @@ from tracking.app.group_tables import group_row, group_tables
 from tracking.app.progress import ProgressMeter
 from tracking.app.sequence_workers import source_of
 from tracking.app.stored_tracks import STATED, StoredTracks, check_place, find_tracks, holds_tracks, run_folders
-from tracking.grouping.belief import Belief, pair_probabilities
+from tracking.grouping.belief import Belief
+from tracking.grouping.pair_beliefs import pair_probabilities
 from tracking.grouping.grouping_choice import default_grouping, grouping_of
 from tracking.recordings.calibration import read_calibration
 from tracking.recordings.options import refuse_options
