@@ -22,9 +22,9 @@ from scenarios.loading.resolve import Entry, resolve
 from sim.sequence import simulate
 from sim.types import Array, Bools, Tracks, Truth
 from tracking.grouping.belief import Belief
-from tracking.grouping.pair_beliefs import pair_probabilities
 from tracking.grouping.foot_points import standing
 from tracking.grouping.known_people import people_as_tracks
+from tracking.grouping.pair_beliefs import pair_probabilities
 from tracking.grouping.tracks_table import tabulate
 
 BINS = 15  # of equal width, between the probabilities 0 and 1

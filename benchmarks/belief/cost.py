@@ -22,10 +22,10 @@ from scenarios.loading.resolve import resolve
 from sim.sequence import simulate
 from sim.types import Array, Truth
 from tracking.grouping.belief import Belief
-from tracking.grouping.pair_beliefs import pair_probabilities
 from tracking.grouping.grouped_tracks import derive
 from tracking.grouping.known_people import people_as_tracks
 from tracking.grouping.online_belief import PairBelief
+from tracking.grouping.pair_beliefs import pair_probabilities
 from tracking.grouping.tracks_table import tabulate
 
 SCENE, SEED = "crowd-dense", 20_000

@@ -22,9 +22,9 @@ from sim.types import Bools, Ints, Truth
 from tracking.fitting.grouping_scenes import simulated
 from tracking.grouping import grouping_choice
 from tracking.grouping.belief import Belief
-from tracking.grouping.pair_beliefs import pair_probabilities
 from tracking.grouping.belief_groups import FoundGroups, belief_groups
 from tracking.grouping.known_people import people_as_tracks
+from tracking.grouping.pair_beliefs import pair_probabilities
 from tracking.grouping.tracks_table import tabulate
 
 DECIDED = ("SPENCER", "now", "groups of events", "probability above 0.5")

@@ -119,9 +119,9 @@ def encounters(frame: Ints, id: Ints, pos: Array, group: Ints, bridge: int) -> l
     encounter to the next.
     """
     rows, start = member_rows(frame, id, group)
-    if not len(start):
-        return []
     t = frame[rows][start]
+    if not (t[1:] == t[:-1]).any():
+        return []
     names, name = np.unique(group[rows][start], return_inverse=True)  # ids may be too large for their products
     i, j = _within_reach(t, pos[rows], start)
     pair, when = name[i] * len(names) + name[j], t[i]  # sorted by group within a frame: name[i] < name[j]

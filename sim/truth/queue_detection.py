@@ -16,6 +16,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 
@@ -221,7 +222,7 @@ class QueueFinder:
         self.end = self.done = 0
         self.following, self.slow = list[_FollowedLine](), dict[int, int]()
         nobody, nowhere = np.zeros(0, np.int64), np.zeros((0, 2))
-        self.rows: tuple[Array, ...] = (nobody, nobody, nowhere, nowhere, nobody)
+        self.rows: tuple[Any, ...] = (nobody, nobody, nowhere, nowhere, nobody)
 
     def add(self, frame: Ints, id: Ints, pos: Array, vel: Array, group: Ints, end: int) -> list[GroupEvent]:
         """Adds the frames up to `end`, and returns the queues that are known to be over; `emitted` is None.
@@ -278,9 +279,7 @@ class QueueFinder:
             if people and f.three - f.since + self.stride >= self.hold and not sideways:
                 before, after = (_groups_of(people, there) for there in (f.there, f.now.there))
                 place = f.middle.real, f.middle.imag
-                found.append(
-                    GroupEvent("queue", f.since + 1, f.now.t + 1, None, before, after, tuple(people), place)
-                )
+                found.append(GroupEvent("queue", f.since + 1, f.now.t + 1, None, before, after, tuple(people), place))
         return found
 
 
@@ -329,13 +328,15 @@ def _lines(motion: MotionRows, waits: Bools, stride: int, ids: Ints | None = Non
     """Returns the lines of waiting people in all moments, in order of time; waits (R,): who waits. ids: of the columns;
     None: the columns themselves."""
     some = np.flatnonzero(waits & (motion.frame % stride == 0))
+    if not len(some):
+        return []
     some = some[np.argsort(motion.frame[some], kind="stable")]
     t, p, place, speed = motion.frame[some], motion.column[some], motion.pos[some], np.nan_to_num(motion.vel[some])
     every = np.argsort(motion.frame, kind="stable")
     person = motion.column if ids is None else ids[motion.column]
     cuts = np.searchsorted(motion.frame[every], np.arange(motion.length + 1))
-    there = {k: every[cuts[k] : cuts[k + 1]] for k in np.unique(t).tolist()}
-    groups = {k: (person[rows], motion.group[rows]) for k, rows in there.items()}
+    rows_at = {k: every[cuts[k] : cuts[k + 1]] for k in np.unique(t).tolist()}
+    there = {k: (person[rows], motion.group[rows]) for k, rows in rows_at.items()}
     p = p if ids is None else ids[p]
     made: list[_LineNow] = []
     for rows, count, u, middle in queue_shapes(place, *close_pairs(t, place, MAX_SPACING)):
@@ -345,8 +346,8 @@ def _lines(motion: MotionRows, waits: Bools, stride: int, ids: Ints | None = Non
         vectors = (x[:, 0] + 1j * x[:, 1] for x in (u, middle))
         columns = (x.tolist() for x in (t[rows[:, 0]], count, p[rows], *vectors, drift))
         made += [
-            _LineNow(when, tuple(people[:n]), *rest, groups[when])
-            for when, n, people, *rest in zip(*columns, strict=True)
+            _LineNow(when, tuple(people[:n]), way, place, drifts, there[when])
+            for when, n, people, way, place, drifts in zip(*columns, strict=True)
         ]
     return sorted(made, key=lambda m: (m.t, min(m.order)))
 

@@ -63,7 +63,7 @@ class StepGrouping:
         from tracking.grouping.belief_kernels import linked_groups
 
         people = len(self.label)
-        cut, found = np.searchsorted(step, np.arange(first, end + 1)), [_in_groups(first - 1, self.label[None])]
+        cut, found = np.searchsorted(step, np.arange(first, end + 1)), [self.last(first - 1)]
         size = max(1, CELLS // max(people, 1))
         for low in range(0, end - first, size):
             # the first row is the step before, which has no rows of pairs here
@@ -73,12 +73,17 @@ class StepGrouping:
             linked_groups(np.append(ends[0], ends), a, b, values, *self.numbers, label)
             found.append(_in_groups(first + low, label[1:]))
             self.label = label[-1]
-        return StepGroups(*(np.concatenate(x) for x in zip(*found, strict=True)))
+        parts = ((g.step, g.person, g.group) for g in found)
+        return StepGroups(*(np.concatenate(x) for x in zip(*parts, strict=True)))
+
+    def last(self, step: int) -> StepGroups:
+        """Returns the groups of the last step, which has the number `step`."""
+        return _in_groups(step, self.label[None])
 
 
-def _in_groups(first: int, label: Ints) -> tuple[Ints, Ints, Ints]:
+def _in_groups(first: int, label: Ints) -> StepGroups:
     at, person = np.nonzero(label >= 0)
-    return at + first, person, label[at, person]
+    return StepGroups(at + first, person, label[at, person])
 
 
 class BeliefGroups:
@@ -107,6 +112,8 @@ class BeliefGroups:
         """Adds the frames up to `end`, and returns the groups of the steps that are complete now. column (R,): the
         person of each row, from 0."""
         steps, belief = self.history.add(rows.frame, column, rows.pos, rows.seen, end), self.belief
+        if steps.first == steps.end:
+            return FoundGroups(Links.none(), self.now.last(steps.first - 1), steps)
         found = steps.pairs
         # What cannot be seen changes nothing: such pairs are linked if they were in one group in the step before.
         log_odds = np.where(found.missed, belief.neutral, found.log_odds[:, 1])
@@ -154,7 +161,8 @@ class _LinkedPairs:
         both, begin, last = stretches(both, t, 1)
         on, off = begin >= first, last + 1 < end
         rows = [np.concatenate([getattr(r, name) for r in self.recent]) for name in ("step", "a", "b")]
-        step, key, log_odds = rows[0], rows[1] * people + rows[2], np.concatenate([r.log_odds for r in self.recent])[:, 1]
+        step, key = rows[0], rows[1] * people + rows[2]
+        log_odds = np.concatenate([r.log_odds for r in self.recent])[:, 1]
         order = np.lexsort((step, key))
         key, log_odds = key[order] * (end + 1) + step[order], log_odds[order]
         low, high = (np.searchsorted(key, both * (end + 1) + at) for at in (np.maximum(begin, first), last + 1))
@@ -198,4 +206,4 @@ def _sums(start: Array, values: Array, low: Ints, high: Ints) -> Array:
     k, at = runs(low, high)
     rows = np.concatenate([np.arange(len(start)), k])
     order = np.argsort(rows, kind="stable")
-    return np.bincount(rows[order], np.concatenate([start, values[at]])[order], len(start))
+    return np.asarray(np.bincount(rows[order], np.concatenate([start, values[at]])[order], len(start)), float)

@@ -111,7 +111,15 @@ def shifts_of_share(
 
 @njit(cache=True)
 def keep_missed(
-    first: int, cut: Ints, row_pair: Ints, a: Ints, b: Ints, seen: Bools, reported: Bools, memory: int, gone: Ints,
+    first: int,
+    cut: Ints,
+    row_pair: Ints,
+    a: Ints,
+    b: Ints,
+    seen: Bools,
+    reported: Bools,
+    memory: int,
+    gone: Ints,
     out: Ints,
 ) -> int:
     """Writes the pairs that keep their belief in steps in which one of the two is missed, and returns how many rows of

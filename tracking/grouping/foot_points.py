@@ -42,10 +42,11 @@ def source_of(run: Iterable[Tracks] | None) -> str | None:
 def can_stand(tracks: Sequence[Tracks], camera: Camera | None, source: str | None = None) -> bool:
     """Returns True if tracks can be moved from the image to the ground: people with boxes, a camera, no pictures.
     source: as in `completed`."""
-    return camera is not None and _stand(tracks, source)
+    return camera is not None and boxes_stand(tracks, source)
 
 
-def _stand(tracks: Sequence[Tracks], source: str | None) -> bool:
+def boxes_stand(tracks: Sequence[Tracks], source: str | None) -> bool:
+    """Returns True if tracks are people in the image whose boxes end at their feet. source: as in `completed`."""
     return plane_of_run(tracks) == "image" and source not in FEETLESS and boxed(tracks)
 
 
@@ -58,7 +59,7 @@ def ground_below(
     source: as in `completed`. The boxes are used only if the tracker names no groups. The ground is unknown for tracks
     that lack boxes, come from pictures, or lie on the ground.
     """
-    if not _stand(tracks, source):
+    if not boxes_stand(tracks, source):
         return Ground()
     if camera is not None or names_groups(tracks):
         return Ground(camera)
@@ -96,8 +97,8 @@ def people_in_metres(
 
 
 def places_on(ground: Ground, scene: Scene | None, tracks: Sequence[Tracks]) -> Array:
-    """Returns the points on a known ground (R, 2), m, of all rows of tracks. Boxes that show the ground tell no place in the
-    scene."""
+    """Returns the points on a known ground (R, 2), m, of all rows of tracks. Boxes that show the ground tell no place in
+    the scene."""
     assert ground.camera is not None
     return standing_points(_boxes(tracks), ground.camera, scene if ground.source == "camera" else None)
 

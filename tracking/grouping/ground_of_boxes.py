@@ -26,6 +26,7 @@ from sim.scene.camera import camera_rotation
 from sim.types import Array, Camera, Tracks
 
 BOXES, LEAST = 300, 100  # boxes that the first frames hold together, and least number
+LONGEST = 60.0  # s from the first box on, after which later boxes do not count, even if there are fewer
 TILTS = np.radians(np.arange(-10.0, 71.0))
 FOCAL = 1.1  # focal length over the width of the picture: between wide lenses (0.8) and surveillance (1.5)
 FARTHEST = 0.5  # largest deviation of ln (H / C) that counts, and that of boxes that cannot stand on the ground
@@ -51,13 +52,13 @@ def ground_of_boxes(tracks: Sequence[Tracks], px_per_m: float, image_size: tuple
 
     px_per_m: image scale at the median height h of these boxes, so that a person's height is H = h / px_per_m.
     image_size: width, height, px; None takes the right and bottom ends of the boxes."""
-    box, last = np.zeros((0, 4)), 0
+    box, last, begun = np.zeros((0, 4)), 0, np.inf
     for t in tracks:
-        if len(box) >= BOXES:
+        if len(box) >= BOXES or t.t > begun + LONGEST:
             break
         measured = t.measured & (t.box[:, 3] > 0) if t.box is not None else np.zeros(0, bool)
         if t.box is not None and measured.any():
-            box, last = np.concatenate([box, t.box[measured]]), t.index
+            box, last, begun = np.concatenate([box, t.box[measured]]), t.index, min(begun, t.t)
     if len(box) < LEAST or not px_per_m > 0:
         return Ground(None, last)
     width, height = image_size or (box[:, :2] + box[:, 2:]).max(axis=0).tolist()

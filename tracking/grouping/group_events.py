@@ -155,7 +155,7 @@ class LabelEvents:
         last = np.array(sorted(self.people), np.int64)
         group_of = {p: g for g, people in self.groups.items() for p in people}
         label = np.array([group_of.get(p, -1) for p in last.tolist()], np.int64)
-        ids, column = np.unique(np.append(last, id), return_inverse=True)
+        column = np.unique(np.append(last, id), return_inverse=True)[1]
         # the frame before counts as frame 0 here
         rows = np.append(np.zeros_like(last), frame - first + 1), column, np.append(label, group)
         for t in [first - 1 + k for k in frames_of_change(*rows, end - first + 1)]:
@@ -175,9 +175,10 @@ def _event(change: GroupChange, start: int, end: int, t: int, motion: PastMotion
     first = max(start - LOOK_BACK, 0)
     places = motion.window(change.members, first, t + 1)[0]
     known = np.flatnonzero(np.isfinite(places[..., 0]).sum(axis=1))
-    # at the start itself nobody may be seen
-    nearest = known[np.abs(known - (start - first)).argmin()]
-    x, y = np.nanmean(places[nearest], axis=0)
+    x = y = float("nan")
+    if len(known):
+        # at the start itself nobody may be seen
+        x, y = np.nanmean(places[known[np.abs(known - (start - first)).argmin()]], axis=0)
     place = float(x), float(y)
     return GroupEvent(change.kind, start + 1, end + 1, t + 1, change.before, change.after, change.members, place)
 

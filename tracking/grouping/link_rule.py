@@ -66,6 +66,12 @@ class Links:
     # sure (L,): False if a link is removed against which its evidence speaks, all in all: the two were never together
     sure: Bools
 
+    @classmethod
+    def none(cls) -> Links:
+        """Returns no switches."""
+        whole, flags = np.zeros(0, np.int64), np.zeros(0, bool)
+        return cls(whole, whole, whole, flags, flags)
+
 
 class RuleLinks:
     """Finds the links between people by the rule, frame by frame.
@@ -133,8 +139,8 @@ def _both_seen(pairs: Ints, seen: Ints, people: int, span: int) -> Iterator[Ints
     """Yields the keys, pair * span + frame, of all frames in which both of a pair were seen, in portions of whole
     pairs. seen (R,): person * span + frame of each row, ascending."""
     a, b = pairs // people, pairs % people
-    low, high = (np.searchsorted(seen, p * span) for p in (a, b)), (np.searchsorted(seen, (p + 1) * span) for p in (a, b))
-    (low_a, low_b), (high_a, high_b) = low, high
+    low_a, low_b = (np.searchsorted(seen, p * span) for p in (a, b))
+    high_a, high_b = (np.searchsorted(seen, (p + 1) * span) for p in (a, b))
     there = (low_a < high_a) & (low_b < high_b)
     pairs, a, b = pairs[there], a[there], b[there]
     begin = np.maximum(seen[low_a[there]] % span, seen[low_b[there]] % span)

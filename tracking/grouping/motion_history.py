@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Set
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -30,12 +30,14 @@ class PeopleRows:
 
     def take(self, rows: Ints | Bools) -> PeopleRows:
         """Returns some of the rows."""
-        return PeopleRows(*(x[rows] for x in (self.frame, self.id, self.pos, self.vel, self.group, self.seen)))
+        some = self.frame[rows], self.id[rows], self.pos[rows], self.vel[rows], self.group[rows]
+        return PeopleRows(*some, self.seen[rows])
 
     def joined(self, more: PeopleRows) -> PeopleRows:
         """Returns these rows followed by rows of later frames."""
-        both = zip(*((x.frame, x.id, x.pos, x.vel, x.group, x.seen) for x in (self, more)), strict=True)
-        return PeopleRows(*map(np.concatenate, both))
+        frame, id, group = (np.append(getattr(self, k), getattr(more, k)) for k in ("frame", "id", "group"))
+        pos, vel = (np.concatenate([getattr(self, k), getattr(more, k)]) for k in ("pos", "vel"))
+        return PeopleRows(frame, id, pos, vel, group, np.append(self.seen, more.seen))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -65,10 +67,11 @@ class _Part:
 @dataclass(eq=False)
 class MotionHistory:
     """The rows of people up to now, by frame. State: parts, one after another, each longer than the next; measured, ids
-    of people who have been measured; end, number of frames."""
+    of people who have been measured; first, the first frame that is remembered; end, number of frames."""
 
     parts: list[_Part] = field(default_factory=list)
     measured: set[int] = field(default_factory=set)
+    first: int = 0
     end: int = 0
 
     def add(self, rows: PeopleRows, end: int) -> None:
@@ -107,18 +110,18 @@ class MotionHistory:
             low = high
         self.parts = kept
 
-    def forget(self, before: int, people: Sequence[int]) -> None:
-        """Forgets frames before `before`, as far as they are parts, and that anybody but `people` has been measured."""
-        self.parts = [part for part in self.parts if part.end > before]
-        self.measured &= {*people}
+    def forget(self, before: int, people: Set[int]) -> None:
+        """Forgets the frames before `before`, and that anybody but `people`, ids, has been measured."""
+        self.first, self.parts = before, [part for part in self.parts if part.end > before]
+        self.measured &= people
 
     def window(self, people: Sequence[int], first: int, end: int) -> tuple[Array, Array, Ints]:
-        """Returns positions, velocities (N, K, 2) and groups (N, K) of K people, ids, in the frames first … end - 1; nan
-        and -1 where a person is absent."""
+        """Returns positions, velocities (N, K, 2) and groups (N, K) of K people, by id, in the frames first … end - 1;
+        nan and -1 where a person is absent."""
         shape = (end - first, len(people))
         pos, vel, group = np.full((*shape, 2), np.nan), np.full((*shape, 2), np.nan), np.full(shape, -1, np.int64)
         for part in self.parts:
-            low, high = max(first, part.first), min(end, part.end)
+            low, high = max(first, part.first, self.first), min(end, part.end)
             if low >= high:
                 continue
             for k, column in enumerate(part.columns(people)):
@@ -133,7 +136,7 @@ class MotionHistory:
         """Returns how many of some people, ids, are measured in each of the frames first … end - 1."""
         out = np.zeros(end - first, np.int64)
         for part in self.parts:
-            low, high = max(first, part.first), min(end, part.end)
+            low, high = max(first, part.first, self.first), min(end, part.end)
             for column in part.columns(people) if low < high else ():
                 if column >= 0:
                     rows = slice(*(int(x) for x in part.motion.find(column, np.array([low, high]))))

@@ -16,7 +16,7 @@ from sim.types import Array, Bools, Ints
 from tracking.grouping.belief import Belief
 from tracking.grouping.mate_share import MateShare
 from tracking.grouping.pair_evidence import PairHistory, PairRows
-from tracking.grouping.person_motion import Motion, StepRows, frames_per_step, step_rows, taken
+from tracking.grouping.person_motion import TIMES, Motion, StepRows, frames_per_step, step_rows, taken
 from tracking.grouping.tracks_table import TracksTable
 
 
@@ -33,8 +33,8 @@ class PairBeliefs:
     noise: Array  # (R,): of positions, m
     missed: Bools  # (R,): True where not both were seen, and the pair keeps its last log-odds
 
-    def take(self, rows: Bools) -> PairBeliefs:
-        """Returns the rows where `rows` (R,) is True."""
+    def take(self, rows: Bools | Ints) -> PairBeliefs:
+        """Returns some of the rows."""
         return PairBeliefs(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 
@@ -86,6 +86,8 @@ class BeliefHistory:
         step = -(-frame // self.size)
         late = step >= self.steps
         self.frame, self.column, self.pos, self.seen = frame[late], column[late], pos[late], seen[late]
+        if first == self.steps:
+            return StepBeliefs(first, first, *_NO_STEPS, _nothing())
         known = step_rows(frame[seen], column[seen], pos[seen], end, self.fps)
         motion, evidence = self.pairs.add(known)
         found = self._judged(evidence)
@@ -146,6 +148,12 @@ class _KeptBeliefs:
         log_odds[own], noise[own] = found.log_odds[row[own]], found.noise[row[own]]
         self.log_odds[number], self.noise[number] = found.log_odds, found.noise
         return PairBeliefs(step, pairs.a[pair], pairs.b[pair], log_odds, noise, np.ones(count, bool))
+
+
+_NO_STEPS = (
+    StepRows(np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros((0, 2)), np.zeros(0)),
+    Motion(np.zeros((0, 2)), np.zeros((0, len(TIMES), 2)), np.zeros((0, 2)), np.zeros((0, 3))),
+)
 
 
 def _nothing() -> PairBeliefs:

@@ -9,6 +9,7 @@ of everybody in the recording counts. Lengths are in m.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -139,7 +140,7 @@ class SteadyPlaces:
             setattr(self, name, taken(getattr(self, name), rows, empty))
 
 
-def taken(table: Array, rows: Ints, empty: float) -> Array:
+def taken(table: Any, rows: Ints, empty: float) -> Any:
     """Returns the rows (R,) of a table (K, ...); `empty` where a row is -1."""
     found = np.full((len(rows), *table.shape[1:]), empty, table.dtype)
     found[rows >= 0] = table[rows[rows >= 0]]

@@ -16,7 +16,8 @@ import numpy as np
 from scenarios.errors import InputError
 from scenarios.limits import is_number
 from sim.scene.camera import scale_of_first_boxes
-from sim.types import Detections, Sequence, Tracks
+from sim.types import Array, Detections, Sequence, Tracks
+from tracking.grouping.ground_of_boxes import LONGEST
 from tracking.running.detection_mode import Given
 
 
@@ -38,8 +39,15 @@ def required(px_per_m: float) -> float:
 
 
 def from_boxes(frames: Iterable[Detections | Tracks | None]) -> ImageScale:
-    """Returns the image scale, px per m, by the heights of the boxes of the first frames; nan if there is no box."""
-    boxed = [(d.index, d.box[:, 3]) for d in frames if d is not None and d.box is not None]
+    """Returns the image scale, px per m, by the heights of the boxes of the first frames, up to 60 s after the first
+    box; nan if there is no box."""
+    boxed, begun = list[tuple[int, Array]](), np.inf
+    for d in frames:
+        if d is not None and d.t > begun + LONGEST:
+            break
+        if d is not None and d.box is not None and len(d.box):
+            begun = min(begun, d.t)
+            boxed.append((d.index, d.box[:, 3]))
     index = np.repeat(np.array([k for k, _ in boxed], np.int64), [len(h) for _, h in boxed])
     return ImageScale(*scale_of_first_boxes(index, np.concatenate([np.zeros(0), *(h for _, h in boxed)])))
 

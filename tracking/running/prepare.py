@@ -22,7 +22,9 @@ from scenarios.limits import INTEGER, JSON_BYTES
 from scenarios.reading import parse_json
 from sim.types import Context, DetectionMode, Detections, Frame, Ints, Sequence, Tracker, Tracks
 from tracking.config import Config
+from tracking.grouping.grouping_choice import Grouping
 from tracking.running import image_scale, tracker_registry
+from tracking.running.completion import Completion
 from tracking.running.detection_mode import (
     InputKind,
     as_frames,
@@ -75,13 +77,25 @@ class PreparedTracker:
     def scale(self, tracks: SequenceOf[Tracks]) -> ImageScale:
         """Returns the image scale for deriving groups from the tracks of frames 1 to now; nan if unknown. It is the
         context's scale if that is known, else the tracker's own, else that of the tracks' boxes."""
-        with self._naming("px_per_m", self.sequence.name):
-            learned = image_scale.learned_by(self.tracker)
-        return image_scale.from_tracks(ImageScale(self.context.px_per_m, self.scale_frames), learned, tracks)
+        known = ImageScale(self.context.px_per_m, self.scale_frames)
+        return image_scale.from_tracks(known, self.learned(), tracks)
 
     def px_per_m(self, tracks: SequenceOf[Tracks]) -> float:
         """Returns the number of px per m that `scale` finds for these tracks; nan if unknown."""
         return self.scale(tracks).px_per_m
+
+    def completion(self, rule: Grouping) -> Completion:
+        """Returns what fills in groups and events of the tracks that `step` returns."""
+        known, context = ImageScale(self.context.px_per_m, self.scale_frames), self.context
+        return Completion(
+            context.fps, known, self.learned, rule, camera=context.camera, scene=context.scene, source=self.input,
+            image_size=context.image_size,
+        )  # fmt: skip
+
+    def learned(self) -> float:
+        """Returns the tracker's own image scale, px per m; nan if it has none."""
+        with self._naming("px_per_m", self.sequence.name):
+            return image_scale.learned_by(self.tracker)
 
     def reset(self, seed: int) -> None:
         """Resets the tracker for this sequence and forgets what it has reported."""

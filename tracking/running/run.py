@@ -118,14 +118,13 @@ def track(
             order of the scenario's script (mode "truth").
     """
     from sim.compiler import clock
-    from tracking.grouping.foot_points import completed
     from tracking.grouping.grouped_tracks import events_at_end, groups_alone, late_groups, names_groups
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     rule = chosen or default_grouping()
     prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
     prepared.reset(seed)
-    reported, spent, begun = [], 0.0, clock()
+    reported, spent, begun = list[Tracks](), 0.0, clock()
     for frame in prepared.frames():
         start = clock()
         reported.append(prepared.step(frame))
@@ -135,11 +134,10 @@ def track(
         if progress is not None:
             progress(frame.index)
     whole = clock() - begun
-    scale, known = prepared.scale(reported), prepared.context
-    tracks, ground = completed(
-        reported, sequence.fps, scale.px_per_m, rule, camera=known.camera, scene=known.scene,
-        source=prepared.input, image_size=known.image_size,
-    )  # fmt: skip
+    completion = prepared.completion(rule)
+    tracks = [*completion.add(reported), *completion.rest()]
+    tracks = [*tracks[:-1], *(completion.with_events_at_end(last) for last in tracks[-1:])]
+    scale, ground = prepared.scale(reported), completion.ground
     named, late, odd = names_groups(reported), late_groups(reported), list[str]()
     if named and chosen is not None:
         odd.append(f"{prepared.name} names groups itself: --grouping has no effect")
@@ -155,7 +153,7 @@ def track(
     speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
     info = run_info(prepared, tracks, seed, sensor or {}, scale, ground, speeds)
     info["events_at_end"] = events_at_end(reported, tracks, sequence.fps)
-    return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
+    return TrackingRun(tuple(tracks), info if named else {**info, "grouping": rule.as_dict()})
 
 
 def group(

@@ -17,8 +17,8 @@ import numpy as np
 from sim.scene.standing import standing_points
 from sim.truth.group_hulls import groups_over_time
 from sim.types import Tracks, Truth
-from tracking.grouping.foot_points import boxed, can_stand, completed, moved_events, standing
-from tracking.grouping.grouped_tracks import groups_in_frames
+from tracking.grouping.foot_points import boxed, can_stand, completed, standing
+from tracking.grouping.grouped_tracks import groups_in_frames, moved_events
 from tracking.scoring.people import IncomparableError, Similarity
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from benchmarks.belief import calibration_by_input as calibration
 from tests import hand_made
-from tracking.grouping.pair_beliefs import PairProbabilities
 from tracking.grouping.known_people import people_as_tracks
+from tracking.grouping.pair_beliefs import PairProbabilities
 
 
 def test_a_calibrated_belief_has_no_error():

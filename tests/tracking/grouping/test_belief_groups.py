@@ -12,8 +12,8 @@ from sim.sequence import simulate
 from tests import reference_belief as slow
 from tracking.grouping import belief_groups as module
 from tracking.grouping.belief import default_belief
-from tracking.grouping.pair_beliefs import PairBeliefs, pair_probabilities
 from tracking.grouping.belief_groups import belief_groups, groups_of_steps
+from tracking.grouping.pair_beliefs import PairBeliefs, pair_probabilities
 from tracking.grouping.person_motion import frames_per_step
 from tracking.grouping.tracks_table import TracksTable
 

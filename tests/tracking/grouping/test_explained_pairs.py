@@ -6,8 +6,8 @@ import numpy as np
 
 from tests.near_pairs import table_of, walking
 from tracking.grouping.belief import default_belief
-from tracking.grouping.pair_beliefs import beliefs_of_tracks
 from tracking.grouping.explained_pairs import VALUES, explain
+from tracking.grouping.pair_beliefs import beliefs_of_tracks
 from tracking.grouping.pair_evidence import NAMES
 
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tracking.grouping.belief import DECISIONS, UNSEEN, default_belief
-from tracking.grouping.pair_beliefs import beliefs_of_tracks
 from tracking.grouping.online_belief import PairBelief
+from tracking.grouping.pair_beliefs import beliefs_of_tracks
 
 FPS = 10.0
 

@@ -15,8 +15,8 @@ from tracking.app.progress import ProgressMeter
 from tracking.app.sequence_workers import source_of
 from tracking.app.stored_tracks import STATED, StoredTracks, check_place, find_tracks, holds_tracks, run_folders
 from tracking.grouping.belief import Belief
-from tracking.grouping.pair_beliefs import pair_probabilities
 from tracking.grouping.grouping_choice import default_grouping, grouping_of
+from tracking.grouping.pair_beliefs import pair_probabilities
 from tracking.recordings.calibration import read_calibration
 from tracking.recordings.options import refuse_options
 from tracking.running import run as runs

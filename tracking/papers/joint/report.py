@@ -19,12 +19,12 @@ import numpy as np
 
 from sim.truth.group_ids_and_changes import Members, PersonSet
 from sim.truth.merge_split_rules import frames_of
-from sim.truth.motion_rows import MotionRows
 from sim.types import Array, Bools, GroupEvent, Groups, Ints
 from tracking.grouping.belief import EVENTS, UNSEEN, default_belief
 from tracking.grouping.belief_kernels import linked_groups
 from tracking.grouping.group_events import SEARCHED, TrackedMotion, corrects, event_of_change
 from tracking.grouping.group_labels import LinkedPeople, parts_of_change
+from tracking.grouping.motion_history import MotionHistory, PeopleRows
 from tracking.grouping.online_belief import PairBelief
 from tracking.papers.joint import partition_labels_kernels
 
@@ -88,12 +88,7 @@ class ReportedEvents:
             return ()
         motion = self._motion()
         made = (event_of_change(c, self.frames - 1, parts_of_change(c, old, self.people), motion) for c in changes)
-        # people are ids here, and columns plus 1 in events
-        return tuple(
-            replace(e, members=tuple(p - 1 for p in e.members), pos=(e.pos[0] * scale, e.pos[1] * scale))
-            for e in made
-            if e is not None
-        )
+        return tuple(replace(e, pos=(e.pos[0] * scale, e.pos[1] * scale)) for e in made if e is not None)
 
     def _lasting(self, id: Ints, log_odds: Array) -> list[PersonSet]:
         belief, group = default_belief(), np.full((2, len(id)), -1)
@@ -119,15 +114,15 @@ class ReportedEvents:
         id, pos, seen = (np.concatenate(part) for part in zip(*self.recent, strict=True))
         order = np.lexsort((frame, id))
         frame, id, pos, seen = frame[order], id[order], pos[order], seen[order]
-        key, vel, alone = id * self.frames + frame, np.full_like(pos, np.nan), np.full(len(id), -1)
+        key, vel = id * self.frames + frame, np.full_like(pos, np.nan)
         before = np.searchsorted(key, key - chord)
         known = (frame >= first + chord) & (key[before] == key - chord)
         vel[known] = (pos[known] - pos[before[known]]) * self.fps / chord
-        measured = seen | ~np.isin(id, id[seen])
-        every, some = (
-            MotionRows(frame[k], id[k], pos[k], vel[k], alone[k], self.frames) for k in (slice(None), measured)
-        )
-        return TrackedMotion(every, self.fps, some)
+        order = np.lexsort((id, frame))
+        rows = PeopleRows(frame, id, pos, vel, np.full(len(id), -1), seen).take(order)
+        history = MotionHistory(end=first)
+        history.add(rows, self.frames)
+        return TrackedMotion(history, self.fps)
 
 
 def known_groups(groups: Members, ids: Ints) -> Ints:
