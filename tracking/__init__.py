@@ -34,15 +34,17 @@ from tracking.environment import register_when_imported  # noqa: E402
 
 if TYPE_CHECKING:
     from tracking.comparison import compare
+    from tracking.running.live import Live
     from tracking.running.run import group, track
     from tracking.scoring import evaluate
     from tracking.tuning.search import tune
 
-__all__ = ["compare", "evaluate", "group", "track", "tune"]
+__all__ = ["Live", "compare", "evaluate", "group", "track", "tune"]
 
 register_when_imported()
 
 _HOME = {
+    "Live": "tracking.running.live",
     "compare": "tracking.comparison",
     "evaluate": "tracking.scoring",
     "group": "tracking.running.run",

@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -25,8 +25,9 @@ from sim.types import BACKGROUNDS, Image
 class BackgroundChoice:
     """Which frames of a recording are the sample for a background model."""
 
-    # "first" for the first `count` frames, "spread" for `count` frames spread evenly over the recording
-    how: Literal["first", "spread"] = "spread"
+    # "first" for the first `count` frames, "spread" for `count` frames spread evenly over the recording, "learn" for at
+    # most 50 frames spread evenly over the first `count`, in which nobody is tracked
+    how: Literal["first", "spread", "learn"] = "spread"
     count: int = BACKGROUNDS  # 1 or more, by default 50
     asked: bool = False  # True if the user gave --background, False for the default
     picture: Path | None = None  # of the empty place
@@ -37,6 +38,8 @@ class BackgroundChoice:
             return f"{self.picture.name} and {replace(self, picture=None)}"
         if self.how == "first":
             return f"first {self.count} frames (causal from frame {self.count})"
+        if self.how == "learn":
+            return f"learned in the first {self.count} frames"
         return f"{self.count} frames spread over the recording (not causal)"
 
     def of(self, length: int, path: Path, size: tuple[int, int] | None = None) -> BackgroundChoice:
@@ -72,6 +75,8 @@ class BackgroundChoice:
 
     def indices(self, length: int) -> list[int]:
         """Returns the frames of the sample, from 1 and ascending, of a recording of `length` frames."""
+        if self.how == "learn":
+            return replace(self, how="spread", count=min(BACKGROUNDS, self.count)).indices(self.count)
         # Else the middle frame of each of `count` equal parts.
         if self.how == "first" or length <= self.count:
             return list(range(1, min(self.count, length) + 1))
@@ -79,16 +84,18 @@ class BackgroundChoice:
 
 
 def parse_choice(text: str | None) -> BackgroundChoice:
-    """Returns the choice that --background names: "first:N", "spread:N" or a picture's path; None: the default."""
+    """Returns the choice that --background names: "first:N", "learn:N", "spread:N" or a picture's path; None: the
+    default."""
     if text is None:
         return BackgroundChoice()
-    found = re.fullmatch(r"(first|spread):([0-9]{1,6})", text)
+    found = re.fullmatch(r"(first|spread|learn):([0-9]{1,6})", text)
     if found is None and Path(text).suffix.lower() in SUFFIXES:
         return BackgroundChoice(picture=Path(text))
     if found is None or int(found[2]) < 1:
-        expected = "first:N or spread:N, N frames, or a picture (JPG, PNG)"
+        expected = "first:N, learn:N or spread:N, N frames, or a picture (JPG, PNG)"
         raise InputError(place="--background", got=text, expected=expected, remedy="for instance first:50")
-    return BackgroundChoice("first" if found[1] == "first" else "spread", int(found[2]), True)
+    how: Any = found[1]
+    return BackgroundChoice(how, int(found[2]), True)
 
 
 @dataclass(frozen=True)
@@ -119,6 +126,25 @@ class BackgroundSample:
             warnings.warn(f"{self.path}: {words}; {remedy}", stacklevel=2)
         found = found[:count]
         return found if self.choice.picture is None else with_copies(found, self.choice.empty(size_of(found[0])))
+
+
+@dataclass(frozen=True)
+class GivenSample:
+    """Pictures (K, H, W, 3) for a background model, chosen before. choice: as of `BackgroundSample`, or None."""
+
+    choice: BackgroundChoice | None
+    pictures: Image
+
+    def __call__(self) -> Image:
+        """Returns the pictures."""
+        return self.pictures
+
+
+def untracked_frames(load: object) -> int:
+    """Returns the number of first frames in which nobody is tracked, as a background is learned. load: what loads the
+    sample of a sequence."""
+    choice = load.choice if isinstance(load, BackgroundSample | GivenSample) else None
+    return choice.count if choice is not None and choice.how == "learn" else 0
 
 
 def with_copies(sample: Image, empty: Image) -> Image:

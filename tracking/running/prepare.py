@@ -20,6 +20,7 @@ import numpy as np
 from scenarios.errors import FlockscopeError, InputError, WorkError
 from scenarios.limits import INTEGER, JSON_BYTES
 from scenarios.reading import parse_json
+from sim.pictures.background_sample import untracked_frames
 from sim.types import Context, DetectionMode, Detections, Frame, Ints, Sequence, Tracker, Tracks
 from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping
@@ -60,6 +61,7 @@ class PreparedTracker:
     frames_given: tuple[Frame, ...] | None
     given: InputFrames | None = None  # as `frames_given`, and what these were chosen from
     scale_frames: int = 0  # as of ImageScale
+    untracked: int = 0  # first frames, in which a background is learned and nobody is tracked
     history: ReportHistory = field(default_factory=ReportHistory)  # what the tracker has reported since `reset`
     planes: PlaneCheck = field(default_factory=PlaneCheck)  # the same, compared with its input
 
@@ -204,7 +206,8 @@ def prepare(
     frames, scale = given.frames, given.scale
     background = sequence.background() if mode == "image" else None
     context = Context(sequence.fps, scale.px_per_m, sequence.camera, sequence.scene, sequence.image_size, background)
-    return PreparedTracker(name, instance, config, context, mode, sequence, frames, given, scale.frames)
+    untracked = untracked_frames(sequence.load_background) if mode == "image" else 0
+    return PreparedTracker(name, instance, config, context, mode, sequence, frames, given, scale.frames, untracked)
 
 
 def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> tuple[str, Tracker, Config | None]:

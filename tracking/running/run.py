@@ -119,22 +119,22 @@ def track(
     """
     from sim.compiler import clock
     from tracking.grouping.grouped_tracks import events_at_end, groups_alone, late_groups, names_groups
+    from tracking.running.live import RunningTracker
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     rule = chosen or default_grouping()
     prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
-    prepared.reset(seed)
+    running = RunningTracker(prepared, rule, seed)
     reported, spent, begun = list[Tracks](), 0.0, clock()
     for frame in prepared.frames():
-        start = clock()
-        reported.append(prepared.step(frame))
+        start, before = clock(), len(reported)
+        reported += running.step(frame)
         spent += clock() - start
-        if len(reported) == 1:
+        if reported and not before:
             prepared.diagnostics(f"frame {frame.index}")
         if progress is not None:
             progress(frame.index)
-    whole = clock() - begun
-    completion = prepared.completion(rule)
+    whole, completion = clock() - begun, running.completion
     tracks = [*completion.add(reported), *completion.rest()]
     tracks = [*tracks[:-1], *(completion.with_events_at_end(last) for last in tracks[-1:])]
     scale, ground = prepared.scale(reported), completion.ground

@@ -88,7 +88,7 @@ def causal_from(sequence: Sequence) -> int | None:
     from sim.pictures.background_sample import BackgroundSample
 
     sample = sequence.load_background
-    if not isinstance(sample, BackgroundSample):
+    if not isinstance(sample, BackgroundSample) or sample.choice.how == "learn":
         return 1
     return sample.choice.count if sample.choice.how == "first" else None
 
