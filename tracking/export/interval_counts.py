@@ -1,4 +1,4 @@
-"""Counts per interval of time: people, groups and events, who crosses lines, who enters and leaves zones, who is inside.
+"""Counts per interval of time: people, groups and events, crossings of lines, and who enters, leaves or is in zones.
 
 Only observed frames count. An interval without any has unknown counts, no zeros; rates and means are per observed time.
 """
@@ -6,7 +6,6 @@ Only observed frames count. An interval without any has unknown counts, no zeros
 from __future__ import annotations
 
 import math
-import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,42 +16,11 @@ import numpy as np
 from scenarios.errors import reject
 from sim.types import Array, Ints
 from tracking.export.places import LINE, Passages, Places, depth, passages
-from tracking.keyword_options import check_ranges, option
+from tracking.export.table_options import MINUTE, TableOptions
 
-MINUTE = 60.0  # s
-UNITS = {"": 1.0, "s": 1.0, "m": 60.0, "min": 60.0, "h": 3600.0}  # s
 # Margin round lines and edges of zones, m: the radius of a footprint. Someone who has crossed stands wholly beyond.
 MARGIN = 0.25
 SIGMAS = 2.0  # standard deviations of a position that the margin is at least
-
-
-@dataclass(frozen=True, kw_only=True)
-class TableOptions:
-    """How the tables of a run or a truth are made."""
-
-    margin: float | None = option(
-        "Who is no farther from a line, or from the edges of a zone, is on none of its sides, m. None: 0.25 m, and at "
-        "least two standard deviations of the tracked position.", None)
-    every: float = option("Length of an interval of counts, s.", MINUTE, low=0.0)
-    start: float = option("Start of the first interval, s.", 0.0, low=0.0)
-    end: float | None = option("End of the last interval, s. None: the end of what was observed.", None)
-    min_duration: float = option("Groups that exist for a shorter time in all are left out, s.", 0.0, low=0.0)
-
-    def check(self) -> None:
-        """Raises InputError for a value out of its range."""
-        check_ranges(self)
-        margin, end = self.margin, self.end
-        reject(margin is not None and not margin >= 0, "", margin, "0 m or more", "correct it", "--margin")
-        expected = f"a time after the start, {self.start:g} s"
-        reject(end is not None and not end > self.start, "", f"{end} s", expected, "correct --start or --end", "--end")
-
-
-def seconds_of(text: str, option: str) -> float:
-    """Returns the seconds of a text such as "10s", "1m", "1.5h" or "10". Raises InputError for any other."""
-    found = re.fullmatch(r"([0-9]{1,9}(?:\.[0-9]{1,9})?)\s*(s|m|min|h)?", text.strip())
-    reject(found is None, "", repr(text), "seconds, or a number with s, m or h", "write 10s or 1m", option)
-    assert found is not None
-    return float(found[1]) * UNITS[found[2] or ""]
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +62,7 @@ class PlaceCounts:
         if not places:
             return
         reject(
-            not rows.metre > 0, "", "positions in px, without their scale", "pixels per metre, for the margin of places",
+            not rows.metre > 0, "", "positions in px, without their scale", "pixels per metre, for their margin",
             "give --px-per-m", "--line, --zone",
         )  # fmt: skip
         margin = np.full(len(order), (MARGIN if options.margin is None else options.margin) * rows.metre)

@@ -1,8 +1,8 @@
 """Places where people are counted: lines and zones, who passes them, and who is inside.
 
-A place is a polygon of K corners in the plane of the positions, in m or px. Two corners are the ends of a line. More are
-a zone, whose edges do not cross. The two sides of a line are left and right of somebody who stands at the first end and
-looks at the second one; those of a zone are inside and outside.
+A place is a polygon of K corners in the plane of the positions, in m or px. Two corners are the ends of a line. More
+are a zone, whose edges do not cross. The two sides of a line are left and right of somebody who stands at the first end
+and looks at the second one; those of a zone are inside and outside.
 
 A position is on one of the sides only if it is farther than a margin from the line, or from the edges of the zone:
 

@@ -31,8 +31,9 @@ from sim.store.own_files import refuse_foreign_file
 from sim.store.tables import parquet_bytes
 from sim.truth.velocities import differentiate
 from sim.types import Array, GroupEvent, Groups, Ints, Tracks, Truth
-from tracking.export.interval_counts import CountedRows, PlaceCounts, TableOptions, interval_counts
+from tracking.export.interval_counts import CountedRows, PlaceCounts, interval_counts
 from tracking.export.places import NOWHERE, Places
+from tracking.export.table_options import TableOptions
 from tracking.grouping.short_groups import LeftOut, concerns, lasting_groups, only, only_ids
 from tracking.keyword_options import documented
 
@@ -141,7 +142,9 @@ def run_tables(
     people = slice(0, 0) if rows.unit == "group" else slice(None)
     known = any(t.groups is not None for t in tracks)
     image = rows.plane == "image"
-    variance = (rows.cov[people, 0, 0] + rows.cov[people, 1, 1]) / 2
+    # Tracks.of_points gives the identity where the covariance is unknown.
+    told = (rows.cov[people] != np.eye(rows.cov.shape[1])).any(axis=(1, 2))
+    variance = np.where(told, (rows.cov[people, 0, 0] + rows.cov[people, 1, 1]) / 2, np.nan)
     return _tables(
         _Rows(
             fps, np.array([t.index for t in tracks], np.int64), "px" if image else "m", px_per_m if image else 1.0,

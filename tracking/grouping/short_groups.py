@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
 from scenarios.errors import counted
-from sim.arrays import joined, no_ids
-from sim.types import Bools, GroupEvent, Groups, Ints, Tracks
+from sim.arrays import joined
+from sim.types import GroupEvent, Groups, Ints, Tracks
 
 
 @dataclass(frozen=True)
@@ -26,10 +26,15 @@ class LeftOut:
         """Returns a line about it, "" if groups of any duration are kept."""
         if not self.seconds:
             return ""
-        return (
-            f"left out: {self.groups} of {counted(self.all_groups, 'group')}, which exist for less than "
-            f"{self.seconds:g} s in all, and {self.events} of {counted(self.all_events, 'event')}, which concern only them"
-        )
+        groups, events = counted(self.all_groups, "group"), counted(self.all_events, "event")
+        return f"left out: {self.groups} of {groups}, under {self.seconds:g} s in all, and {self.events} of {events}"
+
+
+def summed(some: Iterable[LeftOut]) -> LeftOut:
+    """Returns what is left out of several runs together; all have the same `seconds`."""
+    every = [vars(one) for one in some]
+    seconds = max(one["seconds"] for one in every)
+    return LeftOut(seconds, *(sum(one[f.name] for one in every) for f in fields(LeftOut)[1:]))
 
 
 def lasting_groups(groups: Iterable[Groups], fps: float, seconds: float) -> tuple[Ints, int]:
