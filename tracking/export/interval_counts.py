@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import reject
-from sim.types import Array, Ints
+from sim.types import Array, Bools, Ints
 from tracking.export.places import LINE, Passages, Places, depth, passages
 from tracking.export.table_options import MINUTE, TableOptions
 
@@ -33,6 +33,7 @@ class CountedRows:
         frame: Frame (R,) of each row of a person, and `id` (R,) the person; in any order.
         pos: Positions (R, 2 or more), m or px.
         sigma: Standard deviation (R,) of each position on an axis, in the same unit; nan if unknown.
+        seen: Flags (R,): False for positions that are only predicted. These are on no side of a place.
         unit: Unit of the positions, "m" or "px".
         metre: Length of 1 m in this unit; nan if unknown.
     """
@@ -43,6 +44,7 @@ class CountedRows:
     id: Ints
     pos: Array
     sigma: Array
+    seen: Bools
     unit: str
     metre: float
 
@@ -70,8 +72,9 @@ class PlaceCounts:
             margin = np.fmax(margin, SIGMAS * rows.sigma[order])
         for name, corners in places.items():
             self._warn_if_outside(name, corners, rows.unit)
-            least = np.inf if len(corners) == LINE else depth(corners) / 2
-            self.found[name] = passages(self.id, self.pos, corners, np.minimum(margin, least), rows.unit == "px")
+            most = np.inf if len(corners) == LINE else depth(corners) / 2  # in a small zone there is room to be inside
+            beyond = np.where(rows.seen[order], np.minimum(margin, most), np.inf)
+            self.found[name] = passages(self.id, self.pos, corners, beyond, rows.unit == "px")
 
     def _warn_if_outside(self, name: str, corners: Array, unit: str) -> None:
         if not len(self.pos):

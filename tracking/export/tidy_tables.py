@@ -30,7 +30,7 @@ from sim.store.atomic import write_file
 from sim.store.own_files import refuse_foreign_file
 from sim.store.tables import parquet_bytes
 from sim.truth.velocities import differentiate
-from sim.types import Array, GroupEvent, Groups, Ints, Tracks, Truth
+from sim.types import Array, Bools, GroupEvent, Groups, Ints, Tracks, Truth
 from tracking.export.interval_counts import CountedRows, PlaceCounts, interval_counts
 from tracking.export.places import NOWHERE, Places
 from tracking.export.table_options import TableOptions
@@ -116,6 +116,7 @@ class _Rows:
     pos: Array
     vel: Array
     sigma: Array  # (R,) standard deviation of the position on an axis
+    seen: Bools  # (R,) False for people who are only predicted
     heading: Array | None  # (R,) rad, None: the direction of vel
     box: Array | None  # (R, 4) px
     score: Array | None
@@ -149,8 +150,8 @@ def run_tables(
         _Rows(
             fps, np.array([t.index for t in tracks], np.int64), "px" if image else "m", px_per_m if image else 1.0,
             rows.frame[people], rows.id[people], rows.group[people], rows.pos[people], rows.vel[people],
-            np.sqrt(np.maximum(variance, 0.0)), None, None if rows.boxless.all() else rows.box[people],
-            rows.score[people], {}, [t.groups or Groups.none() for t in tracks] if known else None,
+            np.sqrt(np.maximum(variance, 0.0)), rows.seen[people], None,
+            None if rows.boxless.all() else rows.box[people], rows.score[people], {}, [t.groups or Groups.none() for t in tracks] if known else None,
             [e for t in tracks for e in t.events],
         ),
         places, TableOptions(**options),
@@ -181,6 +182,7 @@ def truth_tables(truth: Truth, places: Places = NOWHERE, **options: Any) -> Tidy
     return _tables(
         _Rows(
             truth.fps, listed, unit, metre, truth.frame, truth.id, truth.group, pos, vel, np.full(len(pos), np.nan),
+            np.ones(len(pos), bool),
             truth.heading, truth.box, None, {name: values for name, values in more.items() if values is not None},
             groups, truth.events or (),
         ),
@@ -260,7 +262,9 @@ def _tables(rows: _Rows, places: Places, options: TableOptions) -> TidyTables:
     rows, left_out = _without_short_groups(rows, options.min_duration)
     # People may be labelled in frames whose groups are not.
     observed = np.union1d(rows.listed, rows.frame)
-    of_people = CountedRows(rows.fps, observed, rows.frame, rows.id, rows.pos, rows.sigma, rows.unit, rows.metre)
+    of_people = CountedRows(
+        rows.fps, observed, rows.frame, rows.id, rows.pos, rows.sigma, rows.seen, rows.unit, rows.metre
+    )
     counted = PlaceCounts(of_people, places, options)
     u = rows.unit
     speed = np.hypot(rows.vel[:, 0], rows.vel[:, 1])
