@@ -8,7 +8,9 @@ loop over the frames of each person: who has been farther than 0.25 m from a lin
 has crossed it. Exact tracks are the true positions of people who are at most half outside of the image. `blob` gets
 simulated boxes. An error is the sum of the differences per scene, line and direction, as a share of the true number;
 with its sign, or all counted as positive. The intervals are of the scenes' own shares. Each step: every change of side
-between two frames counts, as with --margin 0.
+between two frames counts, as with --margin 0. With errors: true positions with errors of a standard deviation of 0.3 m
+on each axis, which last for some 1 s (an autoregression with the factor 0.9 per frame) or are new in each frame; the
+covariance is reported, or not.
 
 People at lines: `cases.toml`, where each person does one thing at one of the lines. Counts to the left and right.
 """
@@ -17,6 +19,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterator, Mapping
+from math import sqrt
 from pathlib import Path
 
 import numpy as np
@@ -26,11 +29,12 @@ from benchmarks.support.in_memory import truth_in_view
 from benchmarks.support.options import add_seeds, new_parser
 from benchmarks.support.tables import head, mean_cell, row
 from scenarios.loading.resolve import resolve
+from sim.rng import rng
 from sim.sequence import simulate
-from sim.types import Array, Ints, Truth
+from sim.types import Array, Frame, Tracks, Truth
 from tracking.export.interval_counts import MARGIN
 from tracking.export.places import Places, inside
-from tracking.export.tidy_tables import TidyTables, truth_tables
+from tracking.export.tidy_tables import TidyTables, run_tables, truth_tables
 
 CASES = Path(__file__).with_name("cases.toml")
 # What people do at the lines of the cases: the ends in x, m, and how often each crosses it to the left and right.
@@ -45,6 +49,7 @@ DOES = {
 }  # fmt: skip
 COUNTS = ("across_to_left", "across_to_right", "along_to_left", "along_to_right", "zone_enter", "zone_leave")
 LINE_COUNTS = 4  # of them are of lines
+ERROR = 0.3  # m, standard deviation on each axis
 
 
 def places_of(truth: Truth) -> Places:
@@ -116,10 +121,33 @@ def scenes(entries: int, seeds: range) -> Iterator[tuple[Array, dict[str, Array]
                 {
                     "exact tracks": counts_of(truth_tables(seen, places)),
                     "exact tracks, each step": counts_of(truth_tables(seen, places, margin=0.0)),
+                    **with_errors(seen, places, rng(seed, "sensor", k)),
                     "`blob`": counts_of(run.tables(places)),
                     "`blob`, each step": counts_of(run.tables(places, margin=0.0)),
                 },
             )
+
+
+def with_errors(truth: Truth, places: Places, random: np.random.Generator) -> dict[str, Array]:
+    """Returns the numbers of COUNTS of true positions with errors, by the kind of error and what is known of it."""
+    assert truth.pos is not None
+    order = np.lexsort((truth.frame, truth.id))
+    first = np.diff(truth.id[order], prepend=-1) != 0
+    new, found = random.normal(0, ERROR, (len(order), 2)), {}
+    for memory, what in ((0.9, "errors that last"), (0.0, "new errors in each frame")):
+        error = new.copy()
+        for k in np.flatnonzero(~first).tolist():
+            error[k] = memory * error[k - 1] + sqrt(1 - memory**2) * new[k]
+        pos = truth.pos.copy()
+        pos[order] += error
+        for cov, known in ((np.full((4, 4), np.nan), "unknown"), (ERROR**2 * np.eye(4), "known")):
+            tracks = []
+            for index in range(1, truth.length + 1):
+                r = truth.rows(index)
+                at, many = Frame(index, (index - 1) / truth.fps), np.tile(cov, (r.stop - r.start, 1, 1))
+                tracks.append(Tracks.of_points(at, truth.id[r], pos[r], cov=many))
+            found[f"with {what}, {known}"] = counts_of(run_tables(tracks, truth.fps, places))
+    return found
 
 
 def streets(entries: int, seeds: range) -> None:
@@ -149,7 +177,7 @@ def people_at_lines(seeds: range) -> None:
     (entry,) = resolve(str(CASES))
     places = {name: np.array([[a, 10.0], [b, 10.0]]) for name, (a, b, *_) in LINES.items()}
     names = tuple(f"{name}_{side}" for name in LINES for side in ("to_left", "to_right"))
-    total = dict[str, Ints | Array]()
+    total = dict[str, Array]()
     for seed in seeds:
         sequence = simulate(entry.scenario, seed, entry.repeat, streams=())
         truth, run = sequence.truth, tracking.track("blob", sequence, detections="file")

@@ -421,7 +421,7 @@ class CsvOptions(TrajnetOptions, words="export csv", run="export:export_csv"):
         metavar="NAME=X1,Y1,X2,Y2,X3,Y3,…")
     margin: float | None = option(
         "Count people at a line or zone once they are farther than this on the other side. Default: 0.25 m, and at "
-        "least two standard deviations of the position.", None, metavar="M")
+        "least 2.5 standard deviations of the tracked position.", None, metavar="M")
     every: str = option("Length of an interval of counts, such as 10s or 1m.", "1m", metavar="DURATION")
     start: str = option("Time at which counts begin.", "0s", metavar="TIME")
     end: str | None = option("Time at which counts end. Default: where the recording ends.", None, metavar="TIME")

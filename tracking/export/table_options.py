@@ -19,7 +19,7 @@ class TableOptions:
     # fmt: off
     margin: float | None = option(
         "Who is no farther from a line, or from the edges of a zone, is on none of its sides, m. None: 0.25 m, and at "
-        "least two standard deviations of the tracked position.", None)
+        "least 2.5 standard deviations of the position where its covariance is known.", None)
     every: float = option("Length of an interval of counts, s.", MINUTE, low=0.0)
     start: float = option("Start of the first interval, s.", 0.0, low=0.0)
     end: float | None = option("End of the last interval, s. None: the end of what was observed.", None)
@@ -32,7 +32,14 @@ class TableOptions:
         margin, end = self.margin, self.end
         reject(margin is not None and not margin >= 0, "", margin, "0 m or more", "correct it", "--margin")
         expected = f"a time after the start, {self.start:g} s"
-        reject(end is not None and not end > self.start, "", f"{end} s", expected, "correct --start or --end", "--end")
+        reject(
+            end is not None and not end > self.start,
+            "",
+            f"{end or 0:g} s",
+            expected,
+            "correct --start or --end",
+            "--end",
+        )
 
 
 def seconds_of(text: str, option: str) -> float:

@@ -151,8 +151,8 @@ def run_tables(
             fps, np.array([t.index for t in tracks], np.int64), "px" if image else "m", px_per_m if image else 1.0,
             rows.frame[people], rows.id[people], rows.group[people], rows.pos[people], rows.vel[people],
             np.sqrt(np.maximum(variance, 0.0)), rows.seen[people], None,
-            None if rows.boxless.all() else rows.box[people], rows.score[people], {}, [t.groups or Groups.none() for t in tracks] if known else None,
-            [e for t in tracks for e in t.events],
+            None if rows.boxless.all() else rows.box[people], rows.score[people], {},
+            [t.groups or Groups.none() for t in tracks] if known else None, [e for t in tracks for e in t.events],
         ),
         places, TableOptions(**options),
     )  # fmt: skip
