@@ -121,7 +121,7 @@ def scenes(entries: int, seeds: range) -> Iterator[tuple[Array, dict[str, Array]
                 {
                     "exact tracks": counts_of(truth_tables(seen, places)),
                     "exact tracks, each step": counts_of(truth_tables(seen, places, margin=0.0)),
-                    **with_errors(seen, places, rng(seed, "sensor", k)),
+                    **with_errors(seen, places, rng(seed, "label", k)),
                     "`blob`": counts_of(run.tables(places)),
                     "`blob`, each step": counts_of(run.tables(places, margin=0.0)),
                 },

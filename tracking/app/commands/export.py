@@ -154,6 +154,8 @@ def _of_sequences(options: TrajnetOptions) -> list[Job]:
 
 def _table_options(options: CsvOptions) -> dict[str, Any]:
     """Returns the options of the tables, with times in s."""
+    got, expected, remedy = "--margin alone", "--line or --zone, where it counts", "add one, or leave it out"
+    reject(options.margin is not None and not (options.line or options.zone), "", got, expected, remedy, "--margin")
     end = None if options.end is None else seconds_of(options.end, "--end")
     times = {name: getattr(options, name) for name in ("every", "start", "min_duration")}
     seconds = {name: seconds_of(text, f"--{name.replace('_', '-')}") for name, text in times.items()}
