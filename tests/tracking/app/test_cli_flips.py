@@ -416,7 +416,7 @@ FLIPS = {
                 "source": ("data", "tracks"), "line": "--line a=1,1,2,2", "zone": "--zone a=1,1,2,2,1,2",
                 "every": "--every 1s", "start": "--start 0.4", "end": "--end 0.4s", "min_duration": "--min-duration 1h",
             },
-            "data --line a=5,0,5,9": {"margin": "--margin 30"},
+            "data --line a=8,0,8,40": {"margin": "--margin 30"},
             "mot": {"fps": "--fps 5"},
         }.items()
     },
