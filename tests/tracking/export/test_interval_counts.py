@@ -124,6 +124,14 @@ def test_who_is_only_predicted_is_on_no_side():
     assert crossed([*tracks, frame(5, {1: (5, 0, -1)})]) == (0, 1)
 
 
+@pytest.mark.parametrize(
+    ("variance", "expected"), [(0.3**2, (0, 1)), (0.01**2, (1, 2)), (1.0, (1, 2)), (np.nan, (1, 2))]
+)
+def test_the_margin_grows_with_the_known_error(variance, expected):
+    """A covariance that is the identity, or nan, is not known."""
+    assert crossed(way([2, 4, 3, 5], cov=variance * np.eye(4)[None])) == expected
+
+
 def test_narrow_zones_have_a_smaller_margin():
     zone = {"strip": np.array([[2.9, -9.0], [3.1, -9.0], [3.1, 9.0], [2.9, 9.0]])}
     columns = run_tables(way([2, 3, 4]), FPS, zone).counts.columns
