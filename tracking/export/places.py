@@ -139,7 +139,7 @@ def steps_through(id: Ints, pos: Array, line: Array) -> Ints:
     before, after = cross(along, a - line[0]) > 0, cross(along, b - line[0]) > 0
     # The ends of the line are on different sides of the step, too.
     between = (cross(step, line[0] - a) > 0) != (cross(step, line[1] - a) > 0)
-    return (after.astype(np.int64) - before) * (between & (id[:-1] == id[1:]))
+    return np.asarray((after.astype(np.int64) - before) * (between & (id[:-1] == id[1:])))
 
 
 def zone_distance(pos: Array, zone: Array) -> Array:

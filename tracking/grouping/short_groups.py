@@ -82,5 +82,5 @@ def without_short_groups(tracks: Sequence[Tracks], fps: float, seconds: float) -
         events = tuple(e for e in t.events if concerns(e, names))
         groups = None if t.groups is None else only(t.groups, kept)
         found.append(t.replace(group=only_ids(t.group, kept), groups=groups, events=events))
-    events, every = (sum(len(t.events) for t in some) for some in (found, tracks))
-    return tuple(found), LeftOut(seconds, number - len(kept), number, every - events, every)
+    after, before = (sum(len(t.events) for t in some) for some in (found, tracks))
+    return tuple(found), LeftOut(seconds, number - len(kept), number, before - after, before)
