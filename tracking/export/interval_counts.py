@@ -20,8 +20,8 @@ from tracking.export.table_options import MINUTE, TableOptions
 
 # Margin round lines and edges of zones, m: the radius of a footprint. Someone who has crossed stands wholly beyond.
 MARGIN = 0.25
-# Standard deviations of a position that the margin is at least: with errors that last (a tracker's) 2 are best, with
-# errors that are new in each frame 3 (`python -m benchmarks counts`).
+# Standard deviations of a position that the margin is at least: a compromise of errors that last for some time, as a
+# tracker's, and errors that are new in each frame, which need more (`python -m benchmarks counts` has both).
 SIGMAS = 2.5
 
 
@@ -54,7 +54,8 @@ class CountedRows:
 class PlaceCounts:
     """Who passes the places of a sequence, and who is inside; computed once, for several tables.
 
-    State: `rows`, the finite positions sorted by (id, frame); `found`, the `Passages` of each place by name.
+    State: `frame`, `id` and `pos` of the rows with finite positions, sorted by (id, frame); `found`, the `Passages` of
+    each place by name.
     """
 
     def __init__(self, rows: CountedRows, places: Places, options: TableOptions) -> None:
@@ -98,7 +99,7 @@ class PlaceCounts:
             order = np.lexsort((self.id[found.row], self.frame[found.row]))
             row, forward = found.row[order], found.forward[order]
             time = (self.frame[row] - 1) / self.fps
-            kept = (time >= self.options.start) & (time < end)
+            kept = (time > self.options.start - 1e-9) & (time < end - 1e-9)
             words = ("to_left", "to_right") if self.is_line(name) else ("enter", "leave")
             columns["place"] += [name] * int(kept.sum())
             columns["direction"] += [words[0] if ahead else words[1] for ahead in forward[kept].tolist()]
