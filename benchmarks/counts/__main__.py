@@ -5,8 +5,8 @@
 Streets: entries of the suite streets, evenly spread over it. Two lines cross the middle of the view, along and across,
 and a zone is the middle quarter of it. The truth is counted over the true positions of everybody, in view or not, by a
 loop over the frames of each person: who has been farther than 0.25 m from a line on one side, and then is on the other,
-has crossed it. Exact tracks are the true positions of people who are at most half outside of the image. `blob` gets
-simulated boxes. An error is the sum of the differences per scene, line and direction, as a share of the true number;
+has crossed it. Exact tracks are true positions, in view those of people who are at most half outside of the image: the
+lines end at the edge of the view, where people come and go. `blob` gets simulated boxes. An error is the sum of the differences per scene, line and direction, as a share of the true number;
 with its sign, or all counted as positive. The intervals are of the scenes' own shares. Each step: every change of side
 between two frames counts, as with --margin 0. With errors: true positions with errors of a standard deviation of 0.3 m
 on each axis, which last for some 1 s (an autoregression with the factor 0.9 per frame) or are new in each frame; the
@@ -119,8 +119,9 @@ def scenes(entries: int, seeds: range) -> Iterator[tuple[Array, dict[str, Array]
             yield (
                 true_counts(sequence.truth, places),
                 {
-                    "exact tracks": counts_of(truth_tables(seen, places)),
-                    "exact tracks, each step": counts_of(truth_tables(seen, places, margin=0.0)),
+                    "exact tracks of everybody": counts_of(truth_tables(sequence.truth, places)),
+                    "exact tracks in view": counts_of(truth_tables(seen, places)),
+                    "exact tracks in view, each step": counts_of(truth_tables(seen, places, margin=0.0)),
                     **with_errors(seen, places, rng(seed, "label", k)),
                     "`blob`": counts_of(run.tables(places)),
                     "`blob`, each step": counts_of(run.tables(places, margin=0.0)),
