@@ -6,7 +6,8 @@ Streets: entries of the suite streets, evenly spread over it. Two lines cross th
 and a zone is the middle quarter of it. The truth is counted over the true positions of everybody, in view or not, by a
 loop over the frames of each person: who has been farther than 0.25 m from a line on one side, and then is on the other,
 has crossed it. Exact tracks are true positions, in view those of people who are at most half outside of the image: the
-lines end at the edge of the view, where people come and go. `blob` gets simulated boxes. An error is the sum of the differences per scene, line and direction, as a share of the true number;
+lines end at the edge of the view, where people come and go. `blob` gets simulated boxes. An error is the sum
+of the differences per scene, line and direction, as a share of the true number;
 with its sign, or all counted as positive. The intervals are of the scenes' own shares. Each step: every change of side
 between two frames counts, as with --margin 0. With errors: true positions with errors of a standard deviation of 0.3 m
 on each axis, which last for some 1 s (an autoregression with the factor 0.9 per frame) or are new in each frame; the
