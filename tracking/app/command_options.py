@@ -47,6 +47,9 @@ SEEDS = partial(option, metavar="A:B")
 SEEDS_HELP = "Seeds from A to B - 1, or one seed."
 LEAST_VISIBLE = partial(option, low=0, high=1, metavar="SHARE")
 SMALLER = "people of whom a smaller share is visible are ignored."
+MIN_DURATION = partial(
+    option, "Leave out groups that exist for a shorter time in all, and events that concern only such groups.", "0s",
+    metavar="DURATION")
 Images = Literal["jpg", "png", "mp4"] | None
 Detections = Literal["image", "truth", "file"] | None
 Similarity = Literal["boxes", "ground", "image"] | None
@@ -181,6 +184,7 @@ class GroupOptions(BoxOptions, words="group"):
     out: Path = OUT()
     grouping: Path | None = GROUPING()
     probabilities: bool = option("Store the probability that two people belong together.", False)
+    min_duration: str = MIN_DURATION()
     camera: Path | None = CAMERA()
 
 
@@ -409,15 +413,23 @@ class PedpyOptions(TrajnetOptions, words="export pedpy", run="export:export_pedp
 
 
 class CsvOptions(TrajnetOptions, words="export csv", run="export:export_csv"):
-    """Write tables of people, groups, members, events and counts per minute as CSV, of tracks or of labels."""
+    """Write tables of people, groups, members, events, crossings and counts as CSV, of tracks or of labels."""
 
     line: list[str] = option("Count who crosses a line. Can be given several times.", [], metavar="NAME=X1,Y1,X2,Y2")
     zone: list[str] = option(
-        "Count who is in a polygon. Can be given several times.", [], metavar="NAME=X1,Y1,X2,Y2,X3,Y3,…")
+        "Count who enters, leaves and is in a polygon. Can be given several times.", [],
+        metavar="NAME=X1,Y1,X2,Y2,X3,Y3,…")
+    margin: float | None = option(
+        "Count people at a line or zone once they are farther than this on the other side. Default: 0.25 m, and at "
+        "least 2.5 standard deviations of the tracked position.", None, metavar="M")
+    every: str = option("Length of an interval of counts, such as 10s or 1m.", "1m", metavar="DURATION")
+    start: str = option("Time at which counts begin.", "0s", metavar="TIME")
+    end: str | None = option("Time at which counts end. Default: where the recording ends.", None, metavar="TIME")
+    min_duration: str = MIN_DURATION()
 
 
 class ParquetOptions(CsvOptions, words="export parquet", run="export:export_parquet"):
-    """Write tables of people, groups, members, events and counts per minute as Parquet, of tracks or of labels."""
+    """Write tables of people, groups, members, events, crossings and counts as Parquet, of tracks or of labels."""
 
 
 class FitSensorOptions(Options, words="fit sensor", run="fit:fit_sensor"):

@@ -14,6 +14,7 @@ from scenarios.errors import counted, shortened
 from sim.types import EVENT_KINDS
 from tracking.app.score_tables import table
 from tracking.grouping.plausibility import median_speed
+from tracking.grouping.short_groups import LeftOut, summed
 from tracking.running.run import TrackingRun
 
 LISTED = 20  # Most groups that are listed one by one.
@@ -45,8 +46,11 @@ def lasting(groups: Iterable[Row]) -> int:
     return sum(group["seconds"] >= LASTING for group in groups)
 
 
-def group_row(run: TrackingRun, folder: Path) -> Row:
-    """Returns the command's result for one run, as a dictionary; folder: where the run is stored."""
+def group_row(run: TrackingRun, folder: Path, left_out: LeftOut) -> Row:
+    """Returns the command's result for one run, as a dictionary.
+
+    folder: where the run is stored. left_out: short groups, which the run does not have.
+    """
     fps = run.info["fps"]
     events = Counter(e.kind for t in run for e in t.events)
     speed = median_speed(run, fps, run.info["px_per_m"] or 1.0)
@@ -55,7 +59,8 @@ def group_row(run: TrackingRun, folder: Path) -> Row:
         "median_speed": None if np.isnan(speed) else speed,
         "people": len({id for t in run for id in t.id.tolist()}),
         "people_in_groups": len({id for t in run for id in t.id[t.group >= 0].tolist()}),
-        "groups": groups_of(run, fps), "events": {kind: events[kind] for kind in EVENT_KINDS}, "folder": folder,
+        "groups": groups_of(run, fps), "left_out": left_out, "folder": folder,
+        "events": {kind: events[kind] for kind in EVENT_KINDS},
     }  # fmt: skip
 
 
@@ -66,8 +71,15 @@ def group_tables(rows: SequenceOf[Row]) -> str:
         "events", rows, lambda some: {kind: sum(r["events"][kind] for r in some) for kind in EVENT_KINDS}
     )
     if len(rows) > 1:
-        return "\n".join([counts, events, f"stored in {rows[0]['folder'].parent}"])
-    return "\n".join([counts, *_longest(rows[0]), events, _place(rows[0]), f"stored in {rows[0]['folder']}"])
+        return "\n".join([counts, events, *_left_out(rows), f"stored in {rows[0]['folder'].parent}"])
+    place, stored = _place(rows[0]), f"stored in {rows[0]['folder']}"
+    return "\n".join([counts, *_longest(rows[0]), events, *_left_out(rows), place, stored])
+
+
+def _left_out(rows: SequenceOf[Row]) -> list[str]:
+    """Returns a line about the short groups that are left out of all runs, none if groups of any duration are kept."""
+    text = summed(row["left_out"] for row in rows).text()
+    return [text] if text else []
 
 
 def _counts_table(title: str, rows: SequenceOf[Row], cells: Callable[[SequenceOf[Row]], dict[str, object]]) -> str:

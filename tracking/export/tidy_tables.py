@@ -1,4 +1,4 @@
-"""Tidy tables of a run or a truth: people, people_summary, groups, members, events and counts, and their files.
+"""Tidy tables of a run or a truth: people, people_summary, groups, members, events, crossings, counts, and their files.
 
 A tidy table has one observation a row. The names of its columns end with their unit: `x_m`, `speed_m_s`, `t_s`; what is
 in the image is in px. Unknown values are empty cells. Groups and members are those that the run or truth states in each
@@ -8,11 +8,7 @@ All tables are written as CSV or Parquet; the people also as texts of positions 
 object a line, for each person a scene that spans the frames of the person, then a track for each person and frame.
 PedPy and JuPedSim: lines `id frame x y`, apart by tabs, below comments with the frame rate and the names of columns.
 
-Counts are of lines that people cross, and of zones in which they are, per minute. A place is a polygon of K corners in
-the plane of the positions: of two corners, a line; of more, a zone, whose edges do not cross. Who goes from one side of
-a line to the other between two sightings has crossed it, however long the gap. Left and right are those of somebody who
-stands at the first corner and looks at the second one. Who walks up and down on a line is counted each time; the
-difference of both directions holds all the same.
+Crossings are those of lines and zones (tracking.export.places), counts are per interval (interval_counts).
 """
 
 from __future__ import annotations
@@ -20,25 +16,26 @@ from __future__ import annotations
 import json
 import math
 import re
-import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from collections.abc import Sequence as Series
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from scenarios.errors import reject
-from scenarios.limits import COORDINATE
 from sim.arrays import joined, no_ids
-from sim.geometry.polygons import cross
 from sim.store.atomic import write_file
-from sim.store.numeric_text import number_or_nan
 from sim.store.own_files import refuse_foreign_file
 from sim.store.tables import parquet_bytes
 from sim.truth.velocities import differentiate
 from sim.types import Array, Bools, GroupEvent, Groups, Ints, Tracks, Truth
+from tracking.export.interval_counts import CountedRows, PlaceCounts, interval_counts
+from tracking.export.places import NOWHERE, Places
+from tracking.export.table_options import TableOptions
+from tracking.grouping.short_groups import LeftOut, concerns, lasting_groups, only, only_ids
+from tracking.keyword_options import documented
 
 if TYPE_CHECKING:
     import pyarrow
@@ -49,11 +46,6 @@ TEXTS = {
     "trajnet": ("people.ndjson", rb'\{"scene": \{"id": 0, "p": \d+, "s": \d+, "e": \d+, "fps": [0-9.e+-]+\}\}\n|\Z'),
     "pedpy": ("people.txt", rb"# framerate: \S+\n# id\tframe\tx/m\ty/m\n"),
 }
-MINUTE = 60.0  # s
-LINE = 2  # corners of a line
-THIN = 1e-6  # m or px: shorter lines have no length, and thinner zones no area
-Places = Mapping[str, Array]  # by name the corners (K, 2), m or px
-NOWHERE: Places = {}
 BOX = ("box_left_px", "box_top_px", "box_width_px", "box_height_px")
 
 
@@ -72,7 +64,7 @@ class TidyTable:
         import pyarrow as pa
 
         lists = {name: pa.list_(pa.int64()) for name, v in self.columns.items() if not isinstance(v, np.ndarray)}
-        kinds = dict.fromkeys(self.columns) | lists | {"kind": pa.string()}
+        kinds = dict.fromkeys(self.columns) | lists | dict.fromkeys(("kind", "place", "direction"), pa.string())
         return pa.table({name: pa.array(v, kinds[name], from_pandas=True) for name, v in self.columns.items()})
 
     def to_pandas(self) -> Any:
@@ -90,7 +82,9 @@ class TidyTables:
         groups: One row per group.
         members: One row per group, person, and interval of frames in which the person belongs to the group.
         events: One row per event.
-        counts: One row per minute.
+        crossings: One row per person and passage of a line or of the edge of a zone.
+        counts: One row per interval of time.
+        left_out: Short groups and their events, which are in none of the tables.
     """
 
     people: TidyTable
@@ -98,7 +92,13 @@ class TidyTables:
     groups: TidyTable
     members: TidyTable
     events: TidyTable
+    crossings: TidyTable
     counts: TidyTable
+    left_out: LeftOut
+
+    def named(self) -> dict[str, TidyTable]:
+        """Returns the tables by name."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "left_out"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,54 +108,66 @@ class _Rows:
     fps: float
     listed: Ints  # frames that were observed; frames between them break no interval
     unit: str  # of positions: "m" or "px"
+    metre: float  # length of 1 m in this unit, nan if unknown
     # people, (R,) or (R, D), sorted by (frame, id); vel is nan, group -1 where unknown
     frame: Ints
     id: Ints
     group: Ints
     pos: Array
     vel: Array
+    sigma: Array  # (R,) standard deviation of the position on an axis
+    seen: Bools  # (R,) False for people who are only predicted
     heading: Array | None  # (R,) rad, None: the direction of vel
     box: Array | None  # (R, 4) px
     score: Array | None
     more: Mapping[str, Array | Ints]  # visibility, truncation and subgroup (R,), by name, those that are known
     groups: Series[Groups] | None  # of each listed frame; None: not labelled
     events: Series[GroupEvent]
-    places: Places
 
     def seconds(self, frame: Any) -> Any:
         return (frame - 1) / self.fps
 
 
-def run_tables(tracks: Series[Tracks], fps: float, places: Places = NOWHERE) -> TidyTables:
+@documented(TableOptions)
+def run_tables(
+    tracks: Series[Tracks], fps: float, places: Places = NOWHERE, *, px_per_m: float = math.nan, **options: Any
+) -> TidyTables:
     """Returns the tidy tables of a run. tracks: one Tracks per frame. For tracks of groups the people tables are empty.
 
-    places: lines and zones by name; `counts` gets columns for each.
+    places: lines and zones by name; `counts`, `crossings` and `people_summary` tell who is there. px_per_m: scale of
+    tracks in the image. Frames between those of the tracks were not observed.
     """
     from sim.store.track_files import flatten
 
     rows = flatten(list(tracks))
     people = slice(0, 0) if rows.unit == "group" else slice(None)
     known = any(t.groups is not None for t in tracks)
+    image = rows.plane == "image"
+    # Tracks.of_points gives the identity where the covariance is unknown.
+    told = (rows.cov[people] != np.eye(rows.cov.shape[1])).any(axis=(1, 2))
+    variance = np.where(told, (rows.cov[people, 0, 0] + rows.cov[people, 1, 1]) / 2, np.nan)
     return _tables(
         _Rows(
-            fps, np.array([t.index for t in tracks], np.int64), "px" if rows.plane == "image" else "m",
-            rows.frame[people], rows.id[people], rows.group[people], rows.pos[people], rows.vel[people], None,
+            fps, np.array([t.index for t in tracks], np.int64), "px" if image else "m", px_per_m if image else 1.0,
+            rows.frame[people], rows.id[people], rows.group[people], rows.pos[people], rows.vel[people],
+            np.sqrt(np.maximum(variance, 0.0)), rows.seen[people], None,
             None if rows.boxless.all() else rows.box[people], rows.score[people], {},
             [t.groups or Groups.none() for t in tracks] if known else None, [e for t in tracks for e in t.events],
-            places,
-        )
+        ),
+        places, TableOptions(**options),
     )  # fmt: skip
 
 
-def truth_tables(truth: Truth, places: Places = NOWHERE) -> TidyTables:
+@documented(TableOptions)
+def truth_tables(truth: Truth, places: Places = NOWHERE, **options: Any) -> TidyTables:
     """Returns the tidy tables of a truth, in m if it has positions on the ground, else of the boxes' centres in px.
 
-    places: lines and zones by name; `counts` gets columns for each.
+    places: lines and zones by name; `counts`, `crossings` and `people_summary` tell who is there.
     """
-    pos, vel, unit = truth.pos, truth.vel, "m"
+    pos, vel, unit, metre = truth.pos, truth.vel, "m", 1.0
     if pos is None:
         assert truth.box is not None
-        pos, unit = truth.box[:, :2] + truth.box[:, 2:] / 2, "px"
+        pos, unit, metre = truth.box[:, :2] + truth.box[:, 2:] / 2, "px", truth.px_per_m
     if vel is None:
         vel = differentiate(truth.frame, truth.id, pos, truth.fps)
     groups = truth.groups if truth.groups is not None else truth.groups_px
@@ -169,9 +181,12 @@ def truth_tables(truth: Truth, places: Places = NOWHERE) -> TidyTables:
     }  # fmt: skip
     return _tables(
         _Rows(
-            truth.fps, listed, unit, truth.frame, truth.id, truth.group, pos, vel, truth.heading, truth.box, None,
-            {name: values for name, values in more.items() if values is not None}, groups, truth.events or (), places,
-        )
+            truth.fps, listed, unit, metre, truth.frame, truth.id, truth.group, pos, vel, np.full(len(pos), np.nan),
+            np.ones(len(pos), bool),
+            truth.heading, truth.box, None, {name: values for name, values in more.items() if values is not None},
+            groups, truth.events or (),
+        ),
+        places, TableOptions(**options),
     )  # fmt: skip
 
 
@@ -189,7 +204,7 @@ def write_tables(tables: TidyTables, folder: Path, form: Form, facts: Mapping[st
         _refuse_foreign(folder / name, beginning)
         write_file(folder / name, body.encode())
         return [folder / name]
-    found = {folder / f"{f.name}.{form}": getattr(tables, f.name).to_arrow() for f in fields(tables)}
+    found = {folder / f"{name}.{form}": table.to_arrow() for name, table in tables.named().items()}
     for path, table in found.items():
         # The first columns have the same names for runs and truths, in m and in px.
         _refuse_foreign(path, re.escape(",".join(table.column_names[:2]) + ",").encode() if form == "csv" else None)
@@ -242,7 +257,15 @@ def _csv(table: pyarrow.Table) -> bytes:
     return (",".join(table.column_names) + "\n").encode() + bytes(sink.getvalue())
 
 
-def _tables(rows: _Rows) -> TidyTables:
+def _tables(rows: _Rows, places: Places, options: TableOptions) -> TidyTables:
+    options.check()
+    rows, left_out = _without_short_groups(rows, options.min_duration)
+    # People may be labelled in frames whose groups are not.
+    observed = np.union1d(rows.listed, rows.frame)
+    of_people = CountedRows(
+        rows.fps, observed, rows.frame, rows.id, rows.pos, rows.sigma, rows.seen, rows.unit, rows.metre
+    )
+    counted = PlaceCounts(of_people, places, options)
     u = rows.unit
     speed = np.hypot(rows.vel[:, 0], rows.vel[:, 1])
     # Who stands has no direction of motion.
@@ -256,10 +279,24 @@ def _tables(rows: _Rows) -> TidyTables:
     people |= rows.more
     people |= {} if rows.groups is None else {"group": rows.group}
     number, group, size, members = _group_rows(rows)
+    of_groups = None if rows.groups is None else {"listed": rows.listed, "frame": number, "id": group}
+    starts = np.array([e.start for e in rows.events], np.int64)
     return TidyTables(
-        TidyTable(people), TidyTable(_summary(rows, speed, members)), TidyTable(_groups(rows, number, group, size)),
-        TidyTable(_intervals(rows, *members)), TidyTable(_events(rows)), TidyTable(_counts(rows, number, group)),
+        TidyTable(people), TidyTable(_summary(rows, speed, members) | counted.dwell(np.unique(rows.id))),
+        TidyTable(_groups(rows, number, group, size)), TidyTable(_intervals(rows, *members)), TidyTable(_events(rows)),
+        TidyTable(counted.crossings()), TidyTable(interval_counts(of_people, counted, of_groups, starts)), left_out,
     )  # fmt: skip
+
+
+def _without_short_groups(rows: _Rows, seconds: float) -> tuple[_Rows, LeftOut]:
+    if rows.groups is None or not seconds:
+        return rows, LeftOut(seconds)
+    kept, number = lasting_groups(rows.groups, rows.fps, seconds)
+    names = set(kept.tolist())
+    events = [e for e in rows.events if concerns(e, names)]
+    left_out = LeftOut(seconds, number - len(kept), number, len(rows.events) - len(events), len(rows.events))
+    group = only_ids(rows.group, kept)
+    return replace(rows, group=group, groups=[only(g, kept) for g in rows.groups], events=events), left_out
 
 
 def _group_rows(rows: _Rows) -> tuple[Ints, Ints, Array, tuple[Ints, Ints, Ints]]:
@@ -333,120 +370,3 @@ def _events(rows: _Rows) -> dict[str, Any]:
         "kind": [e.kind for e in events], **_span(rows, start, end), **ids,
         f"x_{rows.unit}": place[:, 0], f"y_{rows.unit}": place[:, 1],
     }  # fmt: skip
-
-
-def _counts(rows: _Rows, number: Ints, group: Ints) -> dict[str, Any]:
-    """Returns how many people, groups and events are in each minute; means are over the frames that were observed."""
-    # People may be labelled in frames whose groups are not.
-    observed = np.union1d(rows.listed, rows.frame)
-    end = float(rows.seconds(observed[-1] + 1)) if len(observed) else 0.0
-    minutes = np.arange(math.ceil(end / MINUTE - 1e-9))
-
-    def minute(frame: Ints) -> Ints:
-        return np.asarray(rows.seconds(frame) / MINUTE + 1e-9).astype(np.int64)
-
-    def distinct(frame: Ints, id: Ints) -> Ints:
-        pairs = np.unique(np.stack([minute(frame), id], axis=1), axis=0)
-        return _per(pairs[:, 0], minutes)
-
-    def mean(frame: Ints, frames: Ints) -> Array:
-        return np.asarray(_per(minute(frame), minutes) / np.maximum(_per(minute(frames), minutes), 1))
-
-    def arrivals(frame: Ints, id: Ints) -> Ints:
-        order = np.lexsort((frame, id))
-        return _per(minute(frame[order][np.unique(id[order], return_index=True)[1]]), minutes)
-
-    columns = {
-        "minute": minutes, "t_start_s": minutes * MINUTE, "t_end_s": np.minimum((minutes + 1) * MINUTE, end),
-        "people": distinct(rows.frame, rows.id), "people_new": arrivals(rows.frame, rows.id),
-        "people_mean": mean(rows.frame, observed),
-    }  # fmt: skip
-    if rows.groups is not None:
-        columns["groups"] = distinct(number, group)
-        columns["groups_mean"] = mean(number, rows.listed)
-    starts = np.array([e.start for e in rows.events], np.int64)
-    columns["events"] = _per(minute(starts), minutes)
-    known = rows.pos[np.isfinite(rows.pos).all(axis=1), :2]
-    for name, corners in rows.places.items():
-        ends = known.min(axis=0, initial=np.inf), known.max(axis=0, initial=-np.inf)
-        if len(known) and ((corners.max(axis=0) < ends[0]) | (corners.min(axis=0) > ends[1])).any():
-            area = " and ".join(f"{k} from {low:.4g} to {high:.4g}" for k, low, high in zip("xy", *ends, strict=True))
-            warnings.warn(f"{name} lies outside all positions, which have {area} {rows.unit}", stacklevel=2)
-        if len(corners) == LINE:
-            left, right = crossings(rows.frame, rows.id, rows.pos, corners, downwards=rows.unit == "px")
-            columns[f"{name}_to_left"] = _per(minute(left), minutes)
-            columns[f"{name}_to_right"] = _per(minute(right), minutes)
-        else:
-            there = inside(rows.pos, corners)
-            columns[f"{name}_people"] = distinct(rows.frame[there], rows.id[there])
-            columns[f"{name}_people_mean"] = mean(rows.frame[there], observed)
-    return columns
-
-
-def _per(minute: Ints, minutes: Ints) -> Ints:
-    return np.bincount(minute, minlength=len(minutes))[: len(minutes)]
-
-
-def parse_places(lines: Iterable[str], zones: Iterable[str]) -> Places:
-    """Returns the corners (K, 2) of each place, by name.
-
-    lines: texts of two corners, such as "door=2,5,4,5". zones: texts of three or more corners, such as
-    "hall=0,0,9,0,9,6". Raises InputError if a text has another form, a name is repeated, a line has no length, or a
-    zone has no area or edges that cross.
-    """
-    found: dict[str, Array] = {}
-    forms = {"--line": "NAME=x1,y1,x2,y2", "--zone": "NAME=x1,y1,x2,y2,x3,y3,…"}
-    for option, text in [*(("--line", text) for text in lines), *(("--zone", text) for text in zones)]:
-        name, _, cells = text.partition("=")
-        values = list(map(number_or_nan, cells.split(",")))
-        count = len(values) == 4 if option == "--line" else len(values) >= 6 and len(values) % 2 == 0
-        form = f"{forms[option]}, each name once, of letters, digits and _"
-        remedy = "write --line door=2,5,4,5 or --zone hall=0,0,9,0,9,6; in px for tracks in the image"
-        right = name.isidentifier() and name not in found and count and np.max(np.abs(values)) <= COORDINATE
-        reject(not right, "", repr(text), form, remedy, option)
-        found[name] = np.reshape(values, (-1, 2))
-        fault, expected = _fault(found[name]), "two ends apart" if option == "--line" else "corners in order round it"
-        reject(fault, "", f"{text!r}, {fault}", expected, remedy, option)
-    return found
-
-
-def _fault(corners: Array) -> str:
-    """Returns why corners (K, 2) are no line or zone, "" if they are one."""
-    size = float(np.ptp(corners, axis=0).max())
-    if len(corners) == LINE:
-        return "" if size > THIN else "of length 0"
-    a, b = corners, np.roll(corners, -1, axis=0)
-    sides = [cross(b - a, point - a) for point in corners]  # of corner j from edge i: above 0 if it lies to the left
-    left = np.array(sides).T
-    apart = left * np.roll(left, -1, axis=1) < 0  # edge i has the ends of edge j on its two sides
-    if (apart & apart.T).any():
-        return "whose edges cross"
-    return "" if abs(cross(a, b).sum()) > 2 * THIN * size else "of area 0"
-
-
-def crossings(frame: Ints, id: Ints, pos: Array, line: Array, downwards: bool) -> tuple[Ints, Ints]:
-    """Returns the frames of crossings to the left side of a line, and of crossings to the right side.
-
-    Each crossing gives the first frame on the other side. frame, id (N,), pos (N, 2): people, in any order. line
-    (2, 2): its two ends, beyond which nobody crosses it; left and right are those of somebody who looks from the first
-    to the second. downwards: True if y points down, as in the image.
-    """
-    order = np.lexsort((frame, id))
-    frame, pos = frame[order], pos[order, :2]
-    same = np.diff(id[order]) == 0
-    a, b, when = pos[:-1][same], pos[1:][same], frame[1:][same]
-    along, step = line[1] - line[0], b - a
-    before, after = cross(along, a - line[0]) > 0, cross(along, b - line[0]) > 0
-    # The ends of the line are on different sides of the step, too.
-    hits = (before != after) & ((cross(step, line[0] - a) > 0) != (cross(step, line[1] - a) > 0))
-    left = after != downwards
-    return when[hits & left], when[hits & ~left]
-
-
-def inside(pos: Array, zone: Array) -> Bools:
-    """Returns flags (N,): True for points pos (N, 2) inside the polygon `zone` (K, 2): a ray to the right from there
-    crosses an odd number of its edges."""
-    start, end, point = zone, np.roll(zone, -1, axis=0), pos[:, None, :2]
-    passed = (start[:, 1] > point[..., 1]) != (end[:, 1] > point[..., 1])
-    to_the_right = (cross(end - start, point - start) > 0) == (end[:, 1] > start[:, 1])
-    return np.asarray((passed & to_the_right).sum(axis=1) % 2 == 1)

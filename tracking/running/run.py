@@ -5,6 +5,7 @@ Input: a tracker (name, class or instance) and a sequence. Output: a `TrackingRu
 
 from __future__ import annotations
 
+import math
 import warnings
 from collections.abc import Callable, Mapping
 from collections.abc import Sequence as SequenceOf
@@ -16,7 +17,9 @@ import numpy as np
 
 from scenarios.errors import InputError
 from sim.types import DetectionMode, Sequence, Tracker, Tracks
+from tracking.export.table_options import TableOptions
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
+from tracking.keyword_options import documented
 from tracking.running import image_scale
 from tracking.running.prepare import Params, prepare
 from tracking.running.run_info import OF_TRACKS, facts_of_tracks, run_info
@@ -50,20 +53,25 @@ class TrackingRun(SequenceOf[Tracks]):
     def __len__(self) -> int:
         return len(self.tracks)
 
-    def tables(self, places: Mapping[str, Any] | None = None) -> TidyTables:
-        """Returns the tables people, people_summary, groups, members, events and counts of the run.
+    @documented(TableOptions)
+    def tables(self, places: Mapping[str, Any] | None = None, **options: Any) -> TidyTables:
+        """Returns the tables people, people_summary, groups, members, events, crossings and counts of the run.
 
         `run.tables().people.to_arrow()` gives a table of pyarrow, `to_pandas()` a data frame.
 
         Args:
             places: Lines and zones by name: the two ends (2, 2) of a line, or the K > 2 corners (K, 2) of a zone, in
-                the unit of the tracks (m or px). `counts` gets columns with the number of people who cross the line or
-                are in the zone. None means neither.
+                the unit of the tracks (m or px). The tables state who crosses a line, who enters and leaves a zone, and
+                who is in it. None means neither.
+            **options: How the tables are made.
         """
         from tracking.export.tidy_tables import run_tables
 
         found = {name: np.asarray(corners, float) for name, corners in (places or {}).items()}
-        return run_tables(self.tracks, self.info["fps"], found)
+        scale = self.info.get("px_per_m")
+        return run_tables(
+            self.tracks, self.info["fps"], found, px_per_m=math.nan if scale is None else scale, **options
+        )
 
     def write(self, folder: str | Path, sequence: Sequence, pairs: PairProbabilities | None = None) -> Path:
         """Writes the tracks to the folder as `flockscope track` does, and returns the folder. sequence: what was

@@ -412,7 +412,11 @@ FLIPS = {
         f"export {form} {{0}}/{source} --out {{1}}": flip
         for form in ("csv", "parquet")
         for source, flip in {
-            "data": {"source": ("data", "tracks"), "line": "--line a=1,1,2,2", "zone": "--zone a=1,1,2,2,1,2"},
+            "data": {
+                "source": ("data", "tracks"), "line": "--line a=1,1,2,2", "zone": "--zone a=1,1,2,2,1,2",
+                "every": "--every 1s", "start": "--start 0.4", "end": "--end 0.4s", "min_duration": "--min-duration 1h",
+            },
+            "data --line a=8,0,8,40": {"margin": "--margin 30"},
             "mot": {"fps": "--fps 5"},
         }.items()
     },

@@ -18,7 +18,7 @@ from tests.made_up import make_sequence
 from tracking.export.tidy_tables import run_tables, truth_tables, write_tables
 from tracking.recordings.source import open_source
 
-NAMES = ["counts", "events", "groups", "members", "people", "people_summary"]
+NAMES = ["counts", "crossings", "events", "groups", "members", "people", "people_summary"]
 
 
 def frame(index: int, people: dict[int, tuple[float, float, int]], *events: GroupEvent, plane="ground") -> Tracks:
@@ -118,7 +118,7 @@ def test_events_and_counts():
 def test_a_run_without_people_has_empty_tables(tmp_path: Path):
     for tracks in ([], [frame(1, {})]):
         tables = run_tables(tracks, 2.0)
-        assert [len(table.to_arrow()) for name, table in vars(tables).items() if name != "counts"] == [0] * 5
+        assert [len(table.to_arrow()) for name, table in tables.named().items() if name != "counts"] == [0] * 6
         write_tables(tables, tmp_path, "csv", {})
         assert sorted(p.stem for p in tmp_path.iterdir()) == NAMES
         assert (tmp_path / "people.csv").read_text().startswith("frame,t_s,id,x_m,y_m,")

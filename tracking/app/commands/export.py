@@ -5,6 +5,7 @@ The formats themselves are in tracking.export.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -24,7 +25,9 @@ from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 from tracking.app.sequence_workers import source_of
 from tracking.app.stored_tracks import STATED, StoredTracks, find_tracks, holds_tracks, run_folders
-from tracking.export.tidy_tables import Form, Places, TidyTables, parse_places, run_tables, truth_tables, write_tables
+from tracking.export.places import Places, parse_places
+from tracking.export.table_options import seconds_of
+from tracking.export.tidy_tables import Form, TidyTables, run_tables, truth_tables, write_tables
 from tracking.recordings.options import refuse_options
 from tracking.recordings.track_texts import read_checked_tracks
 
@@ -100,7 +103,10 @@ def export_webdataset(options: WebdatasetOptions) -> CommandResult:
 
 def export(form: Form, options: TrajnetOptions) -> CommandResult:
     """Writes the tables of every run or sequence, or their people, in this form."""
-    places = parse_places(options.line, options.zone) if isinstance(options, CsvOptions) else {}
+    places: Places = {}
+    chosen: dict[str, Any] = {}
+    if isinstance(options, CsvOptions):
+        places, chosen = parse_places(options.line, options.zone), _table_options(options)
     jobs = _of_runs(options) if holds_tracks(options.source) else _of_sequences(options)
     folders = run_folders([sequence for sequence, _ in jobs], options.source, options.out)
     for folder in folders:
@@ -108,12 +114,14 @@ def export(form: Form, options: TrajnetOptions) -> CommandResult:
     rows, lines = [], []
     with ProgressMeter("export", len(jobs)) as meter:
         for (sequence, stored), folder in zip(jobs, folders, strict=True):
-            tables, facts = _tables(sequence, stored, places), {"sequence": sequence.name, "fps": sequence.fps}
+            tables, facts = _tables(sequence, stored, places, chosen), {"sequence": sequence.name, "fps": sequence.fps}
             files = write_tables(tables, folder, form, facts)
-            sizes = {name: len(table.to_arrow()) for name, table in vars(tables).items()}
-            rows.append({**facts, "folder": folder, "files": files, "rows": sizes})
+            sizes = {name: len(table.to_arrow()) for name, table in tables.named().items()}
+            left_out = tables.left_out
+            rows.append({**facts, "folder": folder, "files": files, "rows": sizes, "left_out": vars(left_out)})
             people, groups, events = (sizes[name] for name in ("people_summary", "groups", "events"))
             lines.append(f"{folder}: people {people}, groups {groups}, events {events}")
+            lines += [left_out.text()] * bool(left_out.seconds)
             meter.step(sequence.name)
     return CommandResult({"tables": rows}, "\n".join(lines))
 
@@ -144,8 +152,19 @@ def _of_sequences(options: TrajnetOptions) -> list[Job]:
     return [(sequence, None) for sequence in sequences]
 
 
-def _tables(sequence: Sequence, stored: StoredTracks | None, places: Places) -> TidyTables:
+def _table_options(options: CsvOptions) -> dict[str, Any]:
+    """Returns the options of the tables, with times in s."""
+    got, expected, remedy = "--margin alone", "--line or --zone, where it counts", "add one, or leave it out"
+    reject(options.margin is not None and not (options.line or options.zone), "", got, expected, remedy, "--margin")
+    end = None if options.end is None else seconds_of(options.end, "--end")
+    times = {name: getattr(options, name) for name in ("every", "start", "min_duration")}
+    seconds = {name: seconds_of(text, f"--{name.replace('_', '-')}") for name, text in times.items()}
+    return {"margin": options.margin, "end": end, **seconds}
+
+
+def _tables(sequence: Sequence, stored: StoredTracks | None, places: Places, options: Mapping[str, Any]) -> TidyTables:
     if stored is not None:
-        return run_tables(read_checked_tracks(stored.path), sequence.fps, places)
+        tracks = read_checked_tracks(stored.path)
+        return run_tables(tracks, sequence.fps, places, px_per_m=sequence.px_per_m, **options)
     assert sequence.truth is not None
-    return truth_tables(sequence.truth, places)
+    return truth_tables(sequence.truth, places, **options)

@@ -14,13 +14,16 @@ from tracking.app.group_tables import group_row, group_tables
 from tracking.app.progress import ProgressMeter
 from tracking.app.sequence_workers import source_of
 from tracking.app.stored_tracks import STATED, StoredTracks, check_place, find_tracks, holds_tracks, run_folders
+from tracking.export.table_options import seconds_of
 from tracking.grouping.belief import Belief
 from tracking.grouping.grouping_choice import default_grouping, grouping_of
 from tracking.grouping.pair_beliefs import pair_probabilities
+from tracking.grouping.short_groups import LeftOut, without_short_groups
 from tracking.recordings.calibration import read_calibration
 from tracking.recordings.options import refuse_options
 from tracking.running import run as runs
 from tracking.running.explained_people import people_at_places
+from tracking.running.run import TrackingRun
 
 Peopled = GroupOptions | FitGroupingOptions
 
@@ -35,6 +38,7 @@ def group(options: GroupOptions) -> CommandResult:
     if options.probabilities and not isinstance(belief, Belief):
         expected, remedy = "a grouping with probabilities", "leave --grouping out, or name a file of `fit grouping`"
         raise InputError(place="--probabilities", got="the baseline rule", expected=expected, remedy=remedy)
+    least = seconds_of(options.min_duration, "--min-duration")
     sequences, stored = opened_people(options, options.source)
     folders = run_folders(sequences, options.source, options.out)
     for folder, tracks in zip(folders, stored, strict=True):
@@ -45,15 +49,25 @@ def group(options: GroupOptions) -> CommandResult:
     rows = []
     with ProgressMeter("group", len(sequences)) as meter:
         for sequence, tracks, folder in zip(sequences, stored, folders, strict=True):
-            run = runs.group(sequence, None if tracks is None else tracks.read(sequence), grouping=grouping)
+            found = runs.group(sequence, None if tracks is None else tracks.read(sequence), grouping=grouping)
+            run, left_out = _without_short_groups(found, least)
             pairs = None
             if options.probabilities and isinstance(belief, Belief):
-                pairs = pair_probabilities(people_at_places(sequence, run), sequence.fps, belief)
+                pairs = pair_probabilities(people_at_places(sequence, found), sequence.fps, belief)
             labelled = replace(sequence, load_truth=None) if sequence.source["kind"] == TEXT else sequence
             run.write(folder, labelled, pairs)
-            rows.append({**group_row(run, folder), "pairs": None if pairs is None else len(pairs.frame)})
+            row = group_row(run, folder, left_out)
+            rows.append({**row, "pairs": None if pairs is None else len(pairs.frame)})
             meter.step(sequence.name)
     return CommandResult({"runs": rows}, group_tables(rows))
+
+
+def _without_short_groups(run: TrackingRun, least: float) -> tuple[TrackingRun, LeftOut]:
+    """Returns the run without groups that exist for less than `least` seconds in all, and what is left out."""
+    kept, left_out = without_short_groups(run.tracks, run.info["fps"], least)
+    # Whether a group lasts is known later only.
+    more = {"min_duration": least, "causal_from": None, "causal": False} if least else {}
+    return replace(run, tracks=kept, info={**run.info, **more}), left_out
 
 
 def opened_people(options: Peopled, source: Path) -> tuple[list[Sequence], list[StoredTracks | None]]:

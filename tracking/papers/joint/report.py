@@ -56,7 +56,7 @@ CHORD = 0.5  # Time over which velocities are measured, s.
 
 class ReportedEvents:
     """Makes events from changes of groups that change late. State: recent, ids (K,), positions (K, 2), m, and who was
-    measured (K,) of the last frames; frames, their number so far; people, who is present since which frame (from 0),
+    measured (K,) of the last frames; frames, the last of them, from 1; people, who is present since which frame (from 0),
     and their groups; belief, about events, of measured people; evidence, by pair of ids in one group, the sum of its
     log-odds in that time; fps."""
 
@@ -66,12 +66,12 @@ class ReportedEvents:
         self.evidence: dict[tuple[int, int], float] = {}
         self.people, self.belief = LinkedPeople(), PairBelief(fps, EVENTS)
 
-    def add(self, id: Ints, pos: Array, seen: Bools) -> None:
-        """Adds a frame: ids (K,), places (K, 2), m, and who was measured (K,) of the people tracked."""
+    def add(self, index: int, id: Ints, pos: Array, seen: Bools) -> None:
+        """Adds frame `index`, from 1: ids (K,), places (K, 2), m, and who was measured (K,) of the people tracked."""
         self.recent.append((id.copy(), pos.copy(), seen))
         self.belief.see(np.where(seen[:, None], pos, np.nan))
-        self.people.present = {p: self.people.present.get(p, self.frames) for p in id.tolist()}
-        self.frames += 1
+        self.people.present = {p: self.people.present.get(p, index - 1) for p in id.tolist()}
+        self.frames = index
 
     def events(self, shown: Members, scale: float) -> tuple[GroupEvent, ...]:
         """Returns the events of the last frame added; their members are ids of people. shown: the groups reported in

@@ -149,7 +149,7 @@ class Joint(PointTracker):
         n, c, id = self.nested, self.config, self.people.id
         mean, cov = report.moments(n.x, n.component_weights(c.own_weights))
         self.belief.see(mean[:, :2])
-        self.events.add(id, mean[:, :2], seen)
+        self.events.add(frame.index, id, mean[:, :2], seen)
         events = self.events.events(self.groups, self.unit)
         parts = [frozenset(id[rows].tolist()) for rows in self._groups()]
         self.groups = self.events.people.identities.name(frame.index, parts, self.groups)
