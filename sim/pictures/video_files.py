@@ -144,7 +144,7 @@ def decode_frames(path: Path, index: PacketIndex, wanted: list[int] | None = Non
             count += 1
             number = count if ranks is None or frame is None else ranks.get(frame.pts, 0)
             if frame is not None and not frame.is_corrupt and number and (some is None or number in some):
-                yield number, _picture(frame, index.aspect)
+                yield number, picture_of(frame, index.aspect)
             if some is not None and number >= last:
                 return
 
@@ -176,7 +176,9 @@ def _decode_packet(stream: Any, packet: Any) -> list[Any]:
         return [None]
 
 
-def _picture(frame: Any, aspect: Fraction) -> Image:
+def picture_of(frame: Any, aspect: Fraction | None) -> Image:
+    """Returns a decoded libav frame as a picture (H, W, 3), BGR, with square pixels. aspect: width / height of a stored
+    pixel; None: 1."""
     import cv2
 
     # OpenCV is ten times as fast as swscale's exact conversion; swscale's default darkens by one or two grey levels.
@@ -185,7 +187,7 @@ def _picture(frame: Any, aspect: Fraction) -> Image:
         image = np.asarray(cv2.cvtColor(frame.to_ndarray(), cv2.COLOR_YUV2BGR_I420), np.uint8)
     else:
         image = frame.reformat(format="bgr24", interpolation=EXACT).to_ndarray()
-    size = square_size(frame.width, frame.height, aspect)
+    size = square_size(frame.width, frame.height, aspect or Fraction(1))
     if size != (frame.width, frame.height):
         image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_LINEAR), np.uint8)
     turns = round(frame.rotation / 90) % 4

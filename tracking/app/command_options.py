@@ -157,7 +157,9 @@ class TrackOptions(SceneOptions, BoxOptions, words="track"):
     """Run a tracker and store its tracks."""
 
     tracker: str = ARGUMENT("Name of a tracker, or file.py:Class, or module:Class.", metavar="TRACKER")
-    source: Path = SOURCE()
+    source: str = option(
+        "Sequence or dataset, as for other commands; or live: a camera's number, an address (rtsp://…, http://…), a "
+        "pipe, a growing video with --follow, or - for boxes as lines of JSON.", metavar="SOURCE|LIVE", flag="")
     out: Path = OUT()
     params: str | None = option(
         "The tracker's parameters: a file, or a preset such as paper.", None, metavar="FILE.toml|PRESET")
@@ -171,9 +173,14 @@ class TrackOptions(SceneOptions, BoxOptions, words="track"):
     camera: Path | None = CAMERA()
     background: str | None = option(
         "Frames a background model is trained on, or a picture of the empty place.", None,
-        metavar="first:N|spread:N|PICTURE")
+        metavar="first:N|learn:N|spread:N|PICTURE")
     step_timeout: float | None = STEP_TIMEOUT()
     min_score: float | None = option("Leave out boxes with a lower score, as it stands in their file.", None)
+    follow: float | None = option(
+        "Live: read a video while it grows, until it has not for X seconds.", None, low=0, metavar="X")
+    stream: bool = option("Live: print each frame's people, groups, events and counts as a line of JSON.", False)
+    when_slow: Literal["drop", "wait"] = option(
+        "Live: a tracker that is slower than the pictures leaves some out, or lets the source wait.", "drop")
     workers: int = PROCESSES()
 
 

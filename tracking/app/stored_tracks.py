@@ -11,9 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError, shortened
+from scenarios.errors import InputError, counted, shortened
 from sim.store import seal
 from sim.store.own_files import is_hidden, output_paths
+from sim.store.track_parts import has_parts, join_parts
 from sim.types import Sequence
 from tracking.recordings.mot_table import size_doubt
 from tracking.recordings.mot_text import frame_rate
@@ -101,6 +102,10 @@ def holds_tracks(path: Path) -> bool:
 def find_tracks(path: Path) -> list[StoredTracks]:
     """Returns all stored tracks at or below a path, not read yet, in the order of their paths."""
     got, remedy, found = "no such file or folder", "check the path", list[StoredTracks]()
+    if has_parts(path):
+        info = join_parts(path)
+        words = f"its run was killed; what it had stored, {counted(info['frames'], 'frame')}, is put together"
+        warnings.warn(f"{path}: {words}", stacklevel=2)
     if path.is_file() and path.suffix.lower() in OTHER_FILES:
         got = f"a {path.suffix.lower()} file, no tracks"
     elif path.is_file():

@@ -97,8 +97,8 @@ def people_in_metres(
 
 
 def places_on(ground: Ground, scene: Scene | None, tracks: Sequence[Tracks]) -> Array:
-    """Returns the points on a known ground (R, 2), m, of all rows of tracks. Boxes that show the ground tell no place in
-    the scene."""
+    """Returns the points on a known ground (R, 2), m, of all rows of tracks. Boxes that show the ground tell no place
+    in the scene."""
     assert ground.camera is not None
     return standing_points(_boxes(tracks), ground.camera, scene if ground.source == "camera" else None)
 

@@ -17,11 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, shortened
 from scenarios.limits import FRAME_RATES, FRAMES, SCALES, is_number
 from sim.pictures.background_sample import BackgroundChoice, GivenSample, parse_choice
 from sim.scene.camera import BOXES
 from sim.types import (
+    Array,
     Camera,
     DetectionMode,
     Detections,
@@ -158,6 +159,7 @@ class Live:
             source={"kind": "live", "path": name},
         )  # fmt: skip
         self.index = self.frames = self.boxes = 0
+        self.unobserved: list[tuple[int, int]] = []
         self.reported: Tracks | None = None
         self.last: Tracks | None = None
         self.mode: DetectionMode | None = None
@@ -174,7 +176,7 @@ class Live:
             image: The picture (H, W, 3), BGR, uint8.
             right: That of the right camera of a stereo pair.
             boxes: The detector's boxes (M, 4): left, top, width, height, px; or (M, 5) with scores.
-            points: Positions on the ground (M, 2), m, in place of boxes.
+            points: Positions on the ground (M, 2), m, beside boxes or in place of them.
             scores: Scores (M,) of boxes or points, from 0 to 1.
             t: Time since the first frame, s; None: one frame later than the last. Frames in between are taken as lost.
 
@@ -188,6 +190,8 @@ class Live:
         index = self.index + 1 if t is None else self._index(t)
         lost = [Frame(k, (k - 1) / self.sequence.fps) for k in range(self.index + 1, index)] if self.index else []
         frame = self._frame(index, image, right, boxes, points, scores)
+        if lost:
+            self.unobserved.append((lost[0].index, lost[-1].index))
         completed = [tracks for each in (*lost, frame) for tracks in self._take(each)]
         self.index = index
         return self._now(completed)
@@ -228,8 +232,6 @@ class Live:
 
     def _frame(self, index: int, image: Any, right: Any, boxes: Any, points: Any, scores: Any) -> Frame:
         t = (index - 1) / self.sequence.fps
-        if boxes is not None and points is not None:
-            raise InputError(place="points", got="boxes and points", expected="one of both", remedy="leave one out")
         found = _detections(index, t, boxes, points, scores)
         if image is not None and (np.ndim(image) != 3 or np.shape(image)[2] != 3 or image.dtype != np.uint8):
             got = f"{np.shape(image)}, {getattr(image, 'dtype', type(image).__name__)}"
@@ -343,20 +345,27 @@ def _detections(index: int, t: float, boxes: Any, points: Any, scores: Any) -> D
     """Returns the detections of a frame, None if neither boxes nor points are given."""
     if boxes is None and points is None:
         return None
-    place, columns = ("points", 2) if boxes is None else ("boxes", 4)
+    box, pos = _rows("boxes", boxes, 4), _rows("points", points, 2)
+    score = np.zeros(0) if scores is None else _rows("scores", np.asarray(scores)[:, None], 1)[:, 0]
+    if boxes is not None and scores is None and box.shape[1] == 5:
+        box, score = box[:, :4], box[:, 4]
+    given = [len(a) for a, known in ((box, boxes), (pos, points)) if known is not None]
+    if len({*given, *([len(score)] if len(score) else [])}) > 1:
+        got, expected = f"{len(box)} boxes, {len(pos)} points, {len(score)} scores", "as many of each"
+        raise InputError(place=f"frame {index}", got=got, expected=expected, remedy="give one row for each detection")
+    if points is not None:
+        return Detections(index, t, "ground", pos, None, None if boxes is None else box, score)
+    return Detections(index, t, "image", box[:, :2] + box[:, 2:] / 2, None, box, score)
+
+
+def _rows(name: str, values: Any, columns: int) -> Array:
+    """Returns values as rows (M, columns) of numbers, of boxes with a score (M, 5), too; no rows for None."""
     try:
-        rows = np.asarray(points if boxes is None else boxes, float)
-        rows = rows if rows.size else np.zeros((0, columns))
-        score = np.zeros(0) if scores is None else np.asarray(scores, float)
-    except (TypeError, ValueError) as error:
-        raise InputError(
-            place=place, got=str(error), expected=f"numbers (M, {columns})", remedy="convert them"
-        ) from None
-    if boxes is not None and scores is None and rows.ndim == 2 and rows.shape[1] == 5:
-        rows, score = rows[:, :4], rows[:, 4]
-    if rows.ndim != 2 or rows.shape[1] != columns or score.shape not in ((0,), (len(rows),)):
-        got, expected = f"{rows.shape}, scores {score.shape}", f"(M, {columns}), scores (M,)"
-        raise InputError(place=place, got=got, expected=expected, remedy="give one row for each detection")
-    if boxes is None:
-        return Detections(index, t, "ground", rows, None, None, score)
-    return Detections(index, t, "image", rows[:, :2] + rows[:, 2:] / 2, None, rows, score)
+        rows = np.zeros((0, columns)) if values is None else np.asarray(values, float)
+    except (TypeError, ValueError):
+        rows = np.zeros(0, object)
+    rows = rows if rows.size or rows.dtype == object else np.zeros((0, columns))
+    if rows.ndim != 2 or rows.shape[1] not in ((4, 5) if name == "boxes" else (columns,)):
+        got, expected = f"{shortened(repr(values), 60)}", f"rows of {columns} numbers"
+        raise InputError(place=name, got=got, expected=expected, remedy="give one row for each detection")
+    return rows

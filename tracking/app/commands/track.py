@@ -18,6 +18,7 @@ from sim.types import Sequence
 from tracking.app import option_parsing
 from tracking.app.command_options import TrackOptions
 from tracking.app.command_result import CommandResult
+from tracking.app.commands.track_live import refuse_live_options, track_live
 from tracking.app.group_tables import LASTING, groups_of, lasting
 from tracking.app.progress import ProgressMeter, total_frames
 from tracking.app.sequence_workers import over_sequences, source_of
@@ -25,6 +26,7 @@ from tracking.app.stored_tracks import check_place, run_folders
 from tracking.app.tracker_setup import TrackerSetup
 from tracking.config import Config
 from tracking.grouping.grouping_choice import grouping_of
+from tracking.recordings.live_source import is_live
 from tracking.running.detection_mode import choose_mode
 from tracking.running.run import TrackingRun
 from tracking.running.run_info import input_summary
@@ -43,10 +45,14 @@ def track(options: TrackOptions) -> CommandResult:
     from sim.store.atomic import lock_folder
 
     setup = _setup(options)
+    if is_live(options.source, options.follow is not None):
+        return track_live(setup, options)
+    refuse_live_options(options)
+    path = Path(options.source)
     pictures = setup.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(find(setup.tracker).needs)
-    source = source_of(options, options.source, pictures)
+    source = source_of(options, path, pictures)
     sequences = source.open()
-    folders = run_folders(sequences, options.source, options.out)
+    folders = run_folders(sequences, path, options.out)
     rows = list[dict[str, Any]]()
     with lock_folder(options.out):
         for folder in folders:

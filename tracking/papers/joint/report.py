@@ -56,9 +56,9 @@ CHORD = 0.5  # Time over which velocities are measured, s.
 
 class ReportedEvents:
     """Makes events from changes of groups that change late. State: recent, ids (K,), positions (K, 2), m, and who was
-    measured (K,) of the last frames; frames, the last of them, from 1; people, who is present since which frame (from 0),
-    and their groups; belief, about events, of measured people; evidence, by pair of ids in one group, the sum of its
-    log-odds in that time; fps."""
+    measured (K,) of the last frames; frames, the last of them, from 1; people, who is present since which frame (from
+    0), and their groups; belief, about events, of measured people; evidence, by pair of ids in one group, the sum of
+    its log-odds in that time; fps."""
 
     def __init__(self, fps: float) -> None:
         self.fps, self.frames = fps, 0

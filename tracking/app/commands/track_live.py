@@ -1,0 +1,196 @@
+"""`flockscope track` on a camera, stream, pipe or growing file, or on boxes from standard input: while they come in."""
+
+from __future__ import annotations
+
+import json
+import math
+import signal
+import sys
+import threading
+import time
+import warnings
+from collections import deque
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, closing, contextmanager, nullcontext
+from typing import Any
+
+import numpy as np
+
+from scenarios.errors import FlockscopeError, InputError, counted, printable, reject
+from scenarios.limits import FRAMES
+from sim.store.atomic import lock_folder
+from sim.store.tables import plain
+from sim.store.track_parts import TrackParts
+from sim.types import Groups, Tracks
+from tracking.app.command_options import TrackOptions
+from tracking.app.command_result import INTERRUPTED, CommandResult
+from tracking.app.stored_tracks import check_place
+from tracking.app.tracker_setup import TrackerSetup
+from tracking.recordings.live_source import STDIN, LivePictures, hidden, lines_of_boxes
+from tracking.recordings.video import DEFAULT_FPS
+from tracking.running.live import Live
+
+FILES_ALONE = ("boxes", "person_class", "box_scale", "min_score", "detections")
+LIVE_ALONE = ("follow", "stream")
+LATENCIES = 10_000  # frames whose latency is kept
+
+
+def refuse_live_options(options: TrackOptions) -> None:
+    """Raises InputError if options are given that have an effect on live sources only."""
+    for name in LIVE_ALONE:
+        if getattr(options, name):
+            expected, remedy = "a camera, address or pipe; with --follow a video file", f"leave --{name} out"
+            raise InputError(place=f"--{name}", got=options.source, expected=expected, remedy=remedy)
+
+
+def track_live(setup: TrackerSetup, options: TrackOptions) -> CommandResult:
+    """Tracks what comes in until it ends, or until Ctrl-C, and returns a line for it. All that was tracked is stored,
+    also if the source is lost."""
+    for name in FILES_ALONE:
+        place = f"--{name.replace('_', '-')}"
+        reject(getattr(options, name) is not None, "", options.source, "a recording", f"leave {place} out", place)
+    with ExitStack() as stack:
+        stack.enter_context(lock_folder(options.out))
+        check_place(options.out, setup.tracker)
+        stack.enter_context(setup.limited or nullcontext())
+        stopped = stack.enter_context(_stopped_by_signals())
+        pictures = None
+        if options.source != STDIN:
+            pictures = LivePictures(options.source, options.fps, options.when_slow, options.follow)
+        run = _LiveRun(setup, options, options.fps or _usual_rate() if pictures is None else pictures.fps, pictures)
+        error = None
+        try:
+            for given, at in _given(pictures):
+                if stopped:
+                    break
+                run.step(given, at)
+        except FlockscopeError as lost:
+            error = lost
+        row = run.finish("stopped" if stopped else "ended" if error is None else "lost")
+    if error is not None:
+        if row["frames"]:
+            kept = f"{counted(row['frames'], 'frame')} that were tracked before are in {options.out}"
+            warnings.warn(kept, UserWarning, stacklevel=2)
+        raise error
+    code = INTERRUPTED if stopped else 0
+    return CommandResult({"tracker": setup.tracker, "runs": [row]}, "" if options.stream else _line(row), code)
+
+
+def _given(pictures: LivePictures | None) -> Iterator[tuple[dict[str, Any], float]]:
+    """Yields the arguments of `Live.step` for each frame, and when it came, by the monotonic clock."""
+    if pictures is None:
+        for line in lines_of_boxes(sys.stdin.buffer):
+            yield line, time.monotonic()
+        return
+    with closing(iter(pictures)) as found:  # type: ignore[type-var]
+        for picture in found:
+            yield {"image": picture.image, "t": picture.t}, picture.at
+
+
+def _usual_rate() -> float:
+    text = f"standard input: no frame rate is given, so it is taken as {DEFAULT_FPS:g}; --fps sets it"
+    warnings.warn(text, UserWarning, stacklevel=2)
+    return DEFAULT_FPS
+
+
+@contextmanager
+def _stopped_by_signals() -> Iterator[list[int]]:
+    """Yields a list, which is empty until the process is told to end (Ctrl-C, SIGTERM)."""
+    found: list[int] = []
+    kinds = (signal.SIGINT, signal.SIGTERM)
+    if threading.current_thread() is not threading.main_thread():
+        yield found
+        return
+    before = [signal.signal(kind, lambda number, _: found.append(number)) for kind in kinds]
+    try:
+        yield found
+    finally:
+        for kind, handler in zip(kinds, before, strict=True):
+            signal.signal(kind, handler)
+
+
+class _LiveRun:
+    """A live run on its way to the disk. State: live; parts; latency, ms, of each of the last frames; stored, the last
+    frame that is."""
+
+    def __init__(self, setup: TrackerSetup, options: TrackOptions, fps: float, pictures: LivePictures | None) -> None:
+        self.pictures, self.options = pictures, options
+        self.live = Live(
+            setup.limited or setup.tracker, fps=fps, px_per_m=options.px_per_m, params=setup.config,
+            camera=options.camera, background=options.background, grouping=setup.grouping, seed=setup.seed,
+            name=hidden(options.source),
+        )  # fmt: skip
+        self.parts = TrackParts(options.out, fps, self.live.sequence.camera)
+        self.latency, self.stored = deque[float](maxlen=LATENCIES), 0
+
+    def step(self, given: dict[str, Any], at: float) -> None:
+        """Tracks a frame that came at a moment of the monotonic clock, and stores what is completed."""
+        frame = given.pop("frame", None)
+        if frame is not None:
+            reject("t" in given, "stdin", "t and frame", "one of both", "leave one out")
+            good = isinstance(frame, int) and not isinstance(frame, bool) and 1 <= frame <= FRAMES
+            reject(not good, "stdin", frame, f"a frame from 1 to {FRAMES}", "count frames from 1", "frame")
+            given["t"] = (frame - 1) / self.live.sequence.fps
+        self._keep(self.live.step(**given).completed)
+        self.latency.append(1000 * (time.monotonic() - at))
+
+    def finish(self, ended: str) -> dict[str, Any]:
+        """Stores the run as a whole, and returns its row for the command's result."""
+        now = self.live.finish()
+        self._keep([t for t in now.completed if t.index > self.stored])
+        info = {**self._info(), "ended": ended, "unobserved": self.live.unobserved}
+        last = now.completed[-1] if now.completed else None
+        if self.stored:
+            self.parts.finish(info, last)
+        return {**info, "frames": self.stored, "folder": self.options.out}
+
+    def _keep(self, completed: Sequence[Tracks]) -> None:
+        if not completed:
+            return
+        self.stored = completed[-1].index
+        self.parts.add(completed, self._info())
+        if self.options.stream:
+            for tracks in completed:
+                print(json.dumps(plain(row_of(tracks)), allow_nan=False), flush=True)
+
+    def _info(self) -> dict[str, Any]:
+        more: dict[str, Any] = {"lost_frames": sum(last - first + 1 for first, last in self.live.unobserved)}
+        if self.pictures is not None:
+            more |= {"dropped_pictures": self.pictures.dropped, "reconnects": self.pictures.reconnects}
+        if self.latency:
+            median, high = np.percentile(self.latency, [50, 99]).tolist()
+            more["latency_ms"] = {"median": median, "99 %": high, "frames": len(self.latency)}
+        return {**self.live.info(), **more}
+
+
+def row_of(t: Tracks) -> dict[str, Any]:
+    """Returns the tracks of a frame as `--stream` prints them: people, groups, events and counts."""
+    unit = "px" if t.plane == "image" else "m"
+    groups = Groups.none() if t.groups is None else t.groups
+    rows = zip(t.id.tolist(), t.group.tolist(), t.pos.tolist(), t.vel.tolist(), t.measured.tolist(), strict=True)
+    known = [None] * len(t.id) if t.box is None else t.box.tolist()
+    people = [
+        {"id": id, "group": group, "pos": pos, "vel": _or_none(vel), "box": box, "seen": seen}
+        for (id, group, pos, vel, seen), box in zip(rows, known, strict=True)
+    ]
+    members = [m.tolist() for m in groups.members] or [[] for _ in groups.id]
+    columns = zip(groups.id.tolist(), members, groups.pos.tolist(), groups.size.tolist(), strict=True)
+    together = [{"id": id, "members": who, "pos": pos, "size": _or_none([n])[0]} for id, who, pos, n in columns]
+    return {
+        "frame": t.index, "t": t.t, "unit": unit, "people": people if t.unit == "person" else [], "groups": together,
+        "events": [plain(e) for e in t.events],
+        "counts": {"people": len(t.id) if t.unit == "person" else None, "groups": len(groups.id)},
+    }  # fmt: skip
+
+
+def _or_none(values: list[float]) -> list[float | None]:
+    return [value if math.isfinite(value) else None for value in values]
+
+
+def _line(row: dict[str, Any]) -> str:
+    if not row["frames"]:
+        return f"{row.get('sequence', 'live')}: nothing was tracked"
+    late, lost = row.get("latency_ms"), row["lost_frames"]
+    words = [counted(row["frames"], "frame"), f"{lost} lost"]
+    words += [] if late is None else [f"latency {late['median']:.0f} ms (99 %: {late['99 %']:.0f} ms)"]
+    return printable(f"{row['sequence']}: {', '.join(words)} → {row['folder']}")
