@@ -34,7 +34,7 @@ def print_result(result: CommandResult, as_json: bool) -> int:
         from sim.store.tables import plain
 
         _print_json({"status": STATUS[result.code], **plain(result.data)})
-    else:
+    elif result.text:
         print(printable(result.text, keep="\n").rstrip("\n"), flush=True)
     return result.code
 

@@ -36,7 +36,7 @@ OTHER_FILES = (".toml", ".py", ".json", ".ini", ".html", ".svg", ".jpg", ".png",
 class StoredTracks:
     """The stored tracks of one sequence, not read yet."""
 
-    name: str | None  # from run.json, else of the folder or text; None for a file that the user gave itself
+    name: str | None  # from run.json, else of the folder or text; None for a live run, and a file given itself
     path: Path  # the folder with the tracks, or the file
     info: dict[str, Any]  # content of run.json; {} for tracks of another program and for a run that was not finished
 
@@ -124,7 +124,8 @@ def find_tracks(path: Path) -> list[StoredTracks]:
 def _below(folder: Path, depth: int) -> list[StoredTracks]:
     if seal.is_run(folder):
         info = seal.read_run(folder) if (folder / seal.RUN).is_file() else {}
-        return [StoredTracks(info.get("sequence", folder.name), folder, info)]
+        # what came in live has no name that a sequence could have
+        return [StoredTracks(None if info.get("live") else info.get("sequence", folder.name), folder, info)]
     if (folder / "tracks.txt").is_file():
         return [StoredTracks(folder.name, folder, {})]
     texts = [StoredTracks(p.stem, p, {}) for p in sorted(folder.glob("*.txt")) if not is_hidden(p)]

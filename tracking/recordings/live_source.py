@@ -139,7 +139,8 @@ class LivePictures:
         except FlockscopeError as error:
             self._error = error
         except Exception as error:  # a thread must not end without a word
-            self._error = WorkError(file=self.source, got=f"{type(error).__name__}: {error}", expected="pictures", remedy="")
+            got = f"{type(error).__name__}: {error}"
+            self._error = WorkError(file=self.source, got=got, expected="pictures", remedy="report it: it is a bug")
         finally:
             with suppress(Exception):
                 self._reader.close()
@@ -192,7 +193,10 @@ class _CameraReader:
     def __init__(self, number: int) -> None:
         import cv2
 
+        log = cv2.utils.logging
+        level = log.setLogLevel(log.LOG_LEVEL_SILENT)  # its own words would stand beside ours
         self.camera, self.number = cv2.VideoCapture(number), number
+        log.setLogLevel(level)
         if not self.camera.isOpened():
             remedy = "check that it is connected, and that no other program uses it"
             raise InputError(file=str(number), got="no camera that answers", expected="a camera", remedy=remedy)

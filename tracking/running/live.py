@@ -160,6 +160,7 @@ class Live:
         )  # fmt: skip
         self.index = self.frames = self.boxes = 0
         self.unobserved: list[tuple[int, int]] = []
+        self.zero = 0.0
         self.reported: Tracks | None = None
         self.last: Tracks | None = None
         self.mode: DetectionMode | None = None
@@ -178,7 +179,7 @@ class Live:
             boxes: The detector's boxes (M, 4): left, top, width, height, px; or (M, 5) with scores.
             points: Positions on the ground (M, 2), m, beside boxes or in place of them.
             scores: Scores (M,) of boxes or points, from 0 to 1.
-            t: Time since the first frame, s; None: one frame later than the last. Frames in between are taken as lost.
+            t: Time, s, from 0 or since 1970; None: one frame later than the last. Frames in between are taken as lost.
 
         Returns:
             `Now`.
@@ -188,7 +189,7 @@ class Live:
             WorkError: As in `tracking.track`.
         """
         index = self.index + 1 if t is None else self._index(t)
-        lost = [Frame(k, (k - 1) / self.sequence.fps) for k in range(self.index + 1, index)] if self.index else []
+        lost = [Frame(k, (k - 1) / self.sequence.fps) for k in range(self.index + 1, index)]
         frame = self._frame(index, image, right, boxes, points, scores)
         if lost:
             self.unobserved.append((lost[0].index, lost[-1].index))
@@ -215,10 +216,13 @@ class Live:
             return {}
         prepared, completion = self.running.prepared, self.running.completion
         info = run_info(prepared, [self.last], self.seed, {}, completion.scale, completion.ground, (0.0, 0.0))
-        return {**info, "frames": self.frames, "grouping": self.grouping.as_dict()}
+        return {**info, "live": True, "frames": self.frames, "grouping": self.grouping.as_dict()}
 
     def _index(self, t: float) -> int:
         fps, after = self.sequence.fps, self.index / self.sequence.fps
+        if is_number(t) and not self.index and t > FRAMES / fps:
+            self.zero = t  # of a clock that does not begin with the recording
+        t = t - self.zero if is_number(t) else t
         if not is_number(t, 0.0, FRAMES / fps):
             raise InputError(
                 place="t", got=repr(t), expected="seconds since the first frame", remedy="subtract its time"

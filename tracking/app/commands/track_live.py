@@ -60,10 +60,11 @@ def track_live(setup: TrackerSetup, options: TrackOptions) -> CommandResult:
         run = _LiveRun(setup, options, options.fps or _usual_rate() if pictures is None else pictures.fps, pictures)
         error = None
         try:
-            for given, at in _given(pictures):
+            for number, (given, at) in enumerate(_given(pictures), 1):
                 if stopped:
                     break
-                run.step(given, at)
+                with _naming("stdin" if pictures is None else "", number):
+                    run.step(given, at)
         except FlockscopeError as lost:
             error = lost
         row = run.finish("stopped" if stopped else "ended" if error is None else "lost")
@@ -85,6 +86,15 @@ def _given(pictures: LivePictures | None) -> Iterator[tuple[dict[str, Any], floa
     with closing(iter(pictures)) as found:  # type: ignore[type-var]
         for picture in found:
             yield {"image": picture.image, "t": picture.t}, picture.at
+
+
+@contextmanager
+def _naming(file: str, line: int) -> Iterator[None]:
+    """Names the line of standard input in an error about what it holds."""
+    try:
+        yield
+    except InputError as error:
+        raise (error if error.file or not file else error.replaced(file=f"{file}, line {line}")) from error.__cause__
 
 
 def _usual_rate() -> float:
@@ -118,7 +128,7 @@ class _LiveRun:
         self.live = Live(
             setup.limited or setup.tracker, fps=fps, px_per_m=options.px_per_m, params=setup.config,
             camera=options.camera, background=options.background, grouping=setup.grouping, seed=setup.seed,
-            name=hidden(options.source),
+            name="standard input" if pictures is None else hidden(options.source),
         )  # fmt: skip
         self.parts = TrackParts(options.out, fps, self.live.sequence.camera)
         self.latency, self.stored = deque[float](maxlen=LATENCIES), 0
