@@ -14,13 +14,17 @@ from __future__ import annotations
 
 import signal
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
 from scenarios.errors import FlockscopeError, WorkError
 
+ONCE = 0.5  # s in which SIGINT that comes again, to a process and to its group, is one Ctrl-C
+
 _received = threading.Event()
+_at = [0.0]  # when SIGINT came last
 
 
 @contextmanager
@@ -44,6 +48,10 @@ def recorded_interrupts() -> Iterator[None]:
 
 
 def _record(number: int, frame: FrameType | None) -> None:
+    now, before = time.monotonic(), _at[0]
+    _at[0] = now
+    if _received.is_set() and now - before < ONCE:
+        return
     _received.set()
     signal.default_int_handler(number, frame)
 

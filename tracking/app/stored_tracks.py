@@ -86,6 +86,10 @@ class StoredTracks:
             box_scale=box_scale, px_per_m=sequence.px_per_m if sequence.px_per_m > 0 else None,
             begin=sequence.source.get("begin", 0.0),
         )  # fmt: skip
+        frames = self.info.get("frames")
+        if self.info.get("ended") and sequence.length is not None and frames is not None and frames < sequence.length:
+            words = f"its run has {frames} of {sequence.length} frames; nobody counts as found in the others"
+            warnings.warn(f"{self.folder}: {words}", stacklevel=2)
         boxes = [t.box for t in tracks if t.box is not None and not self.info]
         size = sequence.image_size
         if boxes and size is not None and (doubt := size_doubt(np.concatenate(boxes), size)):

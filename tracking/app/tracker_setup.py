@@ -25,11 +25,15 @@ class TrackerSetup:
     grouping: Grouping | None = None
     limited: TimeLimited | None = None  # the tracker with a limit of time for each step
 
-    def run(self, sequence: Sequence, progress: Callable[[int], None] | None = None) -> TrackingRun:
-        """Tracks the sequence and returns its tracks, with groups and events. Nothing is written."""
+    def run(
+        self, sequence: Sequence, progress: Callable[[int], None] | None = None,
+        if_stopped: Callable[[TrackingRun], None] | None = None,
+    ) -> TrackingRun:  # fmt: skip
+        """Tracks the sequence and returns its tracks, with groups and events. Nothing is written. if_stopped: as of
+        `tracking.track`."""
         from tracking.running.run import track
 
         return track(
             self.limited or self.tracker, sequence, params=self.config, detections=self.detections,
-            sensor=self.sensor, seed=self.seed, grouping=self.grouping, progress=progress,
+            sensor=self.sensor, seed=self.seed, grouping=self.grouping, progress=progress, if_stopped=if_stopped,
         )  # fmt: skip

@@ -12,7 +12,7 @@ from sim.types import Camera, Groups, Scene, Tracks
 from tracking.grouping.foot_points import boxes_stand, ground_below, places_on
 from tracking.grouping.ground_of_boxes import BOXES, LONGEST, Ground
 from tracking.grouping.grouped_tracks import GroupsSoFar, Velocities, names_groups
-from tracking.grouping.grouping_choice import Grouping
+from tracking.grouping.grouping_choice import Grouping, default_grouping
 from tracking.running import image_scale
 from tracking.running.image_scale import ImageScale
 
@@ -33,7 +33,7 @@ class Completion:
         camera: Camera | None, scene: Scene | None, source: str | None = None,
         image_size: tuple[int, int] | None = None,
     ) -> None:  # fmt: skip
-        self.fps, self.known, self.learned, self.rule = fps, known, learned, rule
+        self.fps, self.known, self.learned, self.rule = fps, known, learned, rule or default_grouping()
         self.camera, self.scene, self.source, self.image_size = camera, scene, source, image_size
         self.waiting, self.scale, self.ground = list[Tracks](), known, Ground()
         self.groups: GroupsSoFar | None = None

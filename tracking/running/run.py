@@ -9,7 +9,7 @@ import math
 import warnings
 from collections.abc import Callable, Mapping
 from collections.abc import Sequence as SequenceOf
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
@@ -28,6 +28,7 @@ from tracking.running.time_limit import TimeLimited
 if TYPE_CHECKING:
     from tracking.export.tidy_tables import TidyTables
     from tracking.grouping.pair_beliefs import PairProbabilities
+    from tracking.running.live import RunningTracker
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +96,7 @@ def track(
     seed: int = 0,
     grouping: Grouping | str | Path | None = None,
     progress: Callable[[int], None] | None = None,
+    if_stopped: Callable[[TrackingRun], None] | None = None,
 ) -> TrackingRun:
     """Tracks every frame of a sequence, and derives groups and events if the tracker reports none.
 
@@ -115,6 +117,7 @@ def track(
         grouping: How groups are derived: "belief", "rule", a TOML file of either, or a `Belief` or `LinkRule`. None
             takes the belief.
         progress: Called after each frame with the frame's number, from 1.
+        if_stopped: Called with the run so far if an error or Ctrl-C ends it early, before that is raised.
 
     Returns:
         `TrackingRun`, the tracks of every frame and the content of run.json.
@@ -126,26 +129,46 @@ def track(
             order of the scenario's script (mode "truth").
     """
     from sim.compiler import clock
-    from tracking.grouping.grouped_tracks import events_at_end, groups_alone, late_groups, names_groups
     from tracking.running.live import RunningTracker
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
-    rule = chosen or default_grouping()
     prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
-    running = RunningTracker(prepared, rule, seed)
+    running = RunningTracker(prepared, chosen or default_grouping(), seed)
     reported, spent, begun = list[Tracks](), 0.0, clock()
-    for frame in prepared.frames():
-        start, before = clock(), len(reported)
-        reported += running.step(frame)
-        spent += clock() - start
-        if reported and not before:
-            prepared.diagnostics(f"frame {frame.index}")
-        if progress is not None:
-            progress(frame.index)
-    whole, completion = clock() - begun, running.completion
+
+    def made() -> TrackingRun:
+        speeds = (len(reported) / spent, len(reported) / (clock() - begun)) if reported else (0.0, 0.0)
+        return _completed(running, reported, chosen, run_sensor=sensor or {}, seed=seed, speeds=speeds)
+
+    try:
+        for frame in prepared.frames():
+            start, before = clock(), len(reported)
+            reported += running.step(frame)
+            spent += clock() - start
+            if reported and not before:
+                prepared.diagnostics(f"frame {frame.index}")
+            if progress is not None:
+                progress(frame.index)
+    except BaseException as error:
+        if if_stopped is not None and reported:
+            run = made()
+            why = "Ctrl-C" if isinstance(error, KeyboardInterrupt) else str(error)
+            if_stopped(replace(run, info={**run.info, "ended": f"early: {why}"}))
+        raise
+    return made()
+
+
+def _completed(
+    running: RunningTracker, reported: list[Tracks], chosen: Grouping | None, *, run_sensor: Mapping[str, Any],
+    seed: int, speeds: tuple[float, float],
+) -> TrackingRun:  # fmt: skip
+    """Returns the run of a tracker that has reported these tracks, with groups and events. chosen: the grouping that
+    the user asked for."""
+    from tracking.grouping.grouped_tracks import events_at_end, groups_alone, late_groups, names_groups
+
+    prepared, completion = running.prepared, running.completion
     tracks = [*completion.add(reported), *completion.rest()]
     tracks = [*tracks[:-1], *(completion.with_events_at_end(last) for last in tracks[-1:])]
-    scale, ground = prepared.scale(reported), completion.ground
     named, late, odd = names_groups(reported), late_groups(reported), list[str]()
     if named and chosen is not None:
         odd.append(f"{prepared.name} names groups itself: --grouping has no effect")
@@ -157,11 +180,10 @@ def track(
     if named and groups_alone(reported):
         odd.append(f"{prepared.name}: each of its groups has one member. Give group -1 to people who are alone")
     for text in odd:
-        warnings.warn(text, UserWarning, stacklevel=2)
-    speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
-    info = run_info(prepared, tracks, seed, sensor or {}, scale, ground, speeds)
-    info["events_at_end"] = events_at_end(reported, tracks, sequence.fps)
-    return TrackingRun(tuple(tracks), info if named else {**info, "grouping": rule.as_dict()})
+        warnings.warn(text, UserWarning, stacklevel=4)
+    info = run_info(prepared, tracks, seed, run_sensor, completion.scale, completion.ground, speeds)
+    info["events_at_end"] = events_at_end(reported, tracks, prepared.sequence.fps)
+    return TrackingRun(tuple(tracks), info if named else {**info, "grouping": completion.rule.as_dict()})
 
 
 def group(

@@ -82,9 +82,15 @@ def _track_sequence(
     from sim.store.seal import tracked_hash
 
     tracked_hash(sequence)  # labels that cannot be read are refused now, not after the last frame
-    run = setup.run(sequence, progress)
+    run = setup.run(sequence, progress, partial(_write_early, sequence, folder))
     run.write(folder, sequence)
     return _row(run, folder)
+
+
+def _write_early(sequence: Sequence, folder: Path, run: TrackingRun) -> None:
+    run.write(folder, sequence)
+    words = f"it ended early; the {counted(len(run), 'frame')} that were tracked are in {folder}"
+    warnings.warn(f"{sequence.name}: {words}", UserWarning, stacklevel=2)
 
 
 def _track_in_worker(sequence: Sequence, job: tuple[bytes, Path]) -> dict[str, Any]:
