@@ -6,6 +6,7 @@ Its options and their help stand in tracking.app.command_options.
 from __future__ import annotations
 
 import pickle
+import time
 import warnings
 from collections.abc import Callable
 from contextlib import nullcontext
@@ -38,6 +39,9 @@ ROW_KEYS = (
     "sequence", "detections", "input", "sensor", "background", "causal", "causal_from", "plane", "boxes", "frames",
     "frames_per_second", "whole_frames_per_second",
 )  # fmt: skip
+
+
+KEPT = 10.0  # s that a run must have lasted to be kept when it ends early.
 
 
 def track(options: TrackOptions) -> CommandResult:
@@ -82,12 +86,15 @@ def _track_sequence(
     from sim.store.seal import tracked_hash
 
     tracked_hash(sequence)  # labels that cannot be read are refused now, not after the last frame
-    run = setup.run(sequence, progress, partial(_write_early, sequence, folder))
+    run = setup.run(sequence, progress, partial(_write_early, sequence, folder, time.monotonic()))
     run.write(folder, sequence)
     return _row(run, folder)
 
 
-def _write_early(sequence: Sequence, folder: Path, run: TrackingRun) -> None:
+def _write_early(sequence: Sequence, folder: Path, begun: float, run: TrackingRun) -> None:
+    """Stores a run that ended early, unless it can be made again within seconds."""
+    if time.monotonic() - begun < KEPT:
+        return
     run.write(folder, sequence)
     words = f"it ended early; the {counted(len(run), 'frame')} that were tracked are in {folder}"
     warnings.warn(f"{sequence.name}: {words}", UserWarning, stacklevel=2)
