@@ -123,6 +123,7 @@ class _Rows:
     more: Mapping[str, Array | Ints]  # visibility, truncation and subgroup (R,), by name, those that are known
     groups: Series[Groups] | None  # of each listed frame; None: not labelled
     events: Series[GroupEvent]
+    unobserved: Series[tuple[int, int]] = ()  # first and last frames of stretches in which people are predicted only
 
     def seconds(self, frame: Any) -> Any:
         return (frame - 1) / self.fps
@@ -130,12 +131,14 @@ class _Rows:
 
 @documented(TableOptions)
 def run_tables(
-    tracks: Series[Tracks], fps: float, places: Places = NOWHERE, *, px_per_m: float = math.nan, **options: Any
-) -> TidyTables:
+    tracks: Series[Tracks], fps: float, places: Places = NOWHERE, *, px_per_m: float = math.nan,
+    unobserved: Series[tuple[int, int]] = (), **options: Any,
+) -> TidyTables:  # fmt: skip
     """Returns the tidy tables of a run. tracks: one Tracks per frame. For tracks of groups the people tables are empty.
 
     places: lines and zones by name; `counts`, `crossings` and `people_summary` tell who is there. px_per_m: scale of
-    tracks in the image. Frames between those of the tracks were not observed.
+    tracks in the image. unobserved: first and last frames of stretches that a live run lost. Frames between those of
+    the tracks were not observed, either.
     """
     from sim.store.track_files import flatten
 
@@ -153,17 +156,19 @@ def run_tables(
             np.sqrt(np.maximum(variance, 0.0)), rows.seen[people], None,
             None if rows.boxless.all() else rows.box[people], rows.score[people], {},
             [t.groups or Groups.none() for t in tracks] if known else None, [e for t in tracks for e in t.events],
+            unobserved,
         ),
         places, TableOptions(**options),
     )  # fmt: skip
 
 
 @documented(TableOptions)
-def truth_tables(truth: Truth, places: Places = NOWHERE, **options: Any) -> TidyTables:
+def truth_tables(truth: Truth, places: Mapping[str, Any] | None = None, **options: Any) -> TidyTables:
     """Returns the tidy tables of a truth, in m if it has positions on the ground, else of the boxes' centres in px.
 
-    places: lines and zones by name; `counts`, `crossings` and `people_summary` tell who is there.
+    places: lines and zones by name, as of `TrackingRun.tables`; None means neither.
     """
+    there = {name: np.asarray(corners, float) for name, corners in (places or {}).items()}
     pos, vel, unit, metre = truth.pos, truth.vel, "m", 1.0
     if pos is None:
         assert truth.box is not None
@@ -186,7 +191,7 @@ def truth_tables(truth: Truth, places: Places = NOWHERE, **options: Any) -> Tidy
             truth.heading, truth.box, None, {name: values for name, values in more.items() if values is not None},
             groups, truth.events or (),
         ),
-        places, TableOptions(**options),
+        there, TableOptions(**options),
     )  # fmt: skip
 
 
@@ -261,7 +266,8 @@ def _tables(rows: _Rows, places: Places, options: TableOptions) -> TidyTables:
     options.check()
     rows, left_out = _without_short_groups(rows, options.min_duration)
     # People may be labelled in frames whose groups are not.
-    observed = np.union1d(rows.listed, rows.frame)
+    lost = [np.arange(first, last + 1) for first, last in rows.unobserved]
+    observed = np.setdiff1d(np.union1d(rows.listed, rows.frame), np.concatenate([np.zeros(0, np.int64), *lost]))
     of_people = CountedRows(
         rows.fps, observed, rows.frame, rows.id, rows.pos, rows.sigma, rows.seen, rows.unit, rows.metre
     )

@@ -19,6 +19,7 @@ import numpy as np
 
 from scenarios.errors import InputError, shortened
 from scenarios.limits import FRAME_RATES, FRAMES, SCALES, is_number
+from sim.arrays import no_ids
 from sim.pictures.background_sample import BackgroundChoice, GivenSample, parse_choice
 from sim.scene.camera import BOXES
 from sim.types import (
@@ -30,6 +31,7 @@ from sim.types import (
     GroupEvent,
     Groups,
     Image,
+    Ints,
     Scene,
     Sequence,
     Tracker,
@@ -85,6 +87,11 @@ class Now:
     tracks: Tracks | None
     completed: tuple[Tracks, ...] = ()
     learns: str = ""
+
+    @property
+    def people(self) -> Ints:
+        """The ids (N,) of the people who are there; of groups for a tracker of groups alone."""
+        return no_ids() if self.tracks is None else self.tracks.id
 
     @property
     def groups(self) -> Groups:

@@ -71,8 +71,9 @@ class TrackingRun(SequenceOf[Tracks]):
         found = {name: np.asarray(corners, float) for name, corners in (places or {}).items()}
         scale = self.info.get("px_per_m")
         return run_tables(
-            self.tracks, self.info["fps"], found, px_per_m=math.nan if scale is None else scale, **options
-        )
+            self.tracks, self.info["fps"], found, px_per_m=math.nan if scale is None else scale,
+            unobserved=self.info.get("unobserved", ()), **options,
+        )  # fmt: skip
 
     def write(self, folder: str | Path, sequence: Sequence, pairs: PairProbabilities | None = None) -> Path:
         """Writes the tracks to the folder as `flockscope track` does, and returns the folder. sequence: what was

@@ -113,6 +113,14 @@ def test_who_belongs_together(tmp_path, monkeypatch, capsys):
     assert (tmp_path / "walk.html").is_file()
 
 
+def test_live(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert not play((GUIDES / "live.md").read_text(encoding="utf-8"), False, capsys), "its commands need cameras"
+    printed = capsys.readouterr().out
+    assert " s: " in printed
+    assert "[1, 2]" in printed
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "name",

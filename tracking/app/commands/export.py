@@ -165,6 +165,7 @@ def _table_options(options: CsvOptions) -> dict[str, Any]:
 def _tables(sequence: Sequence, stored: StoredTracks | None, places: Places, options: Mapping[str, Any]) -> TidyTables:
     if stored is not None:
         tracks = read_checked_tracks(stored.path)
-        return run_tables(tracks, sequence.fps, places, px_per_m=sequence.px_per_m, **options)
+        lost = stored.info.get("unobserved") or ()
+        return run_tables(tracks, sequence.fps, places, px_per_m=sequence.px_per_m, unobserved=lost, **options)
     assert sequence.truth is not None
     return truth_tables(sequence.truth, places, **options)
