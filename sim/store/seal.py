@@ -209,10 +209,8 @@ def read_whole_manifest(folder: Path) -> dict[str, Any]:
 def is_run(folder: Path) -> bool:
     """Returns True if the folder holds a run that flockscope wrote, perhaps an unfinished or damaged one."""
     paths = [folder / name for name in (RUN, EXACT) if (folder / name).is_file()]
-    for path in paths:
-        if is_ours(path, RUN_MARKS) is not False:  # a file that cannot be parsed may be ours
-            return True
-    return False
+    # A file that cannot be parsed may be ours.
+    return any(is_ours(path, RUN_MARKS) is not False for path in paths)
 
 
 def run_folder(path: Path) -> Path | None:
