@@ -23,6 +23,7 @@ from tracking.detect.background import Background, fused_foreground
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.ghosts import Ghosts, uncovered_in_sample
 from tracking.detect.person_size import PersonSize
+from tracking.detect.picture_check import PictureCheck
 
 # m^2 at the image's scale, and px: a blob that is smaller than either is noise.
 LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0
@@ -50,7 +51,7 @@ class Segmented:
 class Foreground:
     """The pipeline from a picture to foreground blobs: classify the pixels, clean the mask, find blobs, adapt.
 
-    State: model, the background model; px_per_m, the scale of the image: the context's, or, if that is nan, learned
+    State: model, the background model; check, which warns of pictures that cannot be measured; px_per_m, the scale of the image: the context's, or, if that is nan, learned
     from lone people, nan until then. Raises InputError for an unusable background sample, AssertionError for none.
     """
 
@@ -62,6 +63,7 @@ class Foreground:
         assert context.background is not None
         self.px_per_m, self._learns = context.px_per_m, bool(np.isnan(context.px_per_m))
         self.model = Background(context.background, context.fps, settings)
+        self.check, self._complete = PictureCheck(), True
         self.ghosts = Ghosts(self.shape, self.model.noise, context.fps) if settings.adaptive else None
         if settings.adaptive:
             self.model.mend(uncovered_in_sample(self.model.mean, self.model.second, self.scale), self.model.second)
@@ -103,6 +105,7 @@ class Foreground:
         every fourth row. Ghosts are replaced also where `protected` is True, but not in an implausible picture.
         """
         self.model.adapt(seen.image, seen.classes, protected)
+        self.check.add(seen.plausible, self._complete, self.model.noise)
         if seen.plausible and self.ghosts is not None:
             model = self.model
             found = self.ghosts.find(seen.image, model.gain, seen.mask, model.mean, self.scale, self.least_area)
@@ -114,9 +117,11 @@ class Foreground:
         largest first.
 
         They have at least 0.0125 m^2 at the image's scale, and at least 12 pixels (sec. 3.3). No such blob gives 0
-        rows.
+        rows; of more than 500 the largest are returned.
         """
-        return blobs.find(mask, self.least_area)
+        found = blobs.find(mask, self.least_area)
+        self._complete = len(found) < blobs.MOST
+        return found
 
     def learn_person_size(self, size: PersonSize, sample: Image) -> None:
         """Lets `size` learn, in place, from the blobs of a background sample (K, H, W, 3) BGR uint8.

@@ -23,6 +23,7 @@ from scenarios.reading import parse_json
 from sim.types import Context, DetectionMode, Detections, Frame, Ints, Sequence, Tracker, Tracks
 from tracking.config import Config
 from tracking.running import image_scale, tracker_registry
+from tracking.running.counted_region import Mask, counted_region, detections_inside, with_masked_pictures
 from tracking.running.detection_mode import (
     InputKind,
     as_frames,
@@ -164,6 +165,7 @@ def prepare(
     detections: DetectionMode | None = None,
     sensor: Mapping[str, Any] | None = None,
     seed: int = 0,
+    mask: Mask | None = None,
     inputs: Callable[[DetectionMode, tuple[str, ...], int], InputFrames] | None = None,
 ) -> PreparedTracker:
     """Returns the tracker with all that it needs for the sequence; the arguments are as in `tracking.track`. inputs:
@@ -188,6 +190,16 @@ def prepare(
     else:
         given = inputs(mode, instance.needs, seed)
     frames, scale = given.frames, given.scale
+    if mask is not None:
+        region = counted_region(mask, sequence.image_size)
+        above = sequence.camera is not None and sequence.camera.kind == "top"
+        if frames is None:
+            sequence = with_masked_pictures(sequence, region)
+        else:
+            frames = tuple(
+                f if f.detections is None else replace(f, detections=detections_inside(f.detections, region, above))
+                for f in frames
+            )
     background = sequence.background() if mode == "image" else None
     context = Context(sequence.fps, scale.px_per_m, sequence.camera, sequence.scene, sequence.image_size, background)
     return PreparedTracker(name, instance, config, context, mode, sequence, frames, given, scale.frames)

@@ -18,6 +18,7 @@ from scenarios.errors import InputError
 from sim.types import DetectionMode, Sequence, Tracker, Tracks
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
 from tracking.running import image_scale
+from tracking.running.counted_region import Mask
 from tracking.running.prepare import Params, prepare
 from tracking.running.run_info import OF_TRACKS, facts_of_tracks, run_info
 from tracking.running.time_limit import TimeLimited
@@ -86,6 +87,7 @@ def track(
     sensor: Mapping[str, Any] | None = None,
     seed: int = 0,
     grouping: Grouping | str | Path | None = None,
+    mask: Mask | None = None,
     progress: Callable[[int], None] | None = None,
 ) -> TrackingRun:
     """Tracks every frame of a sequence, and derives groups and events if the tracker reports none.
@@ -106,6 +108,10 @@ def track(
         seed: Seed of the random numbers of tracker and sensor.
         grouping: How groups are derived: "belief", "rule", a TOML file of either, or a `Belief` or `LinkRule`. None
             takes the belief.
+        mask: The region of the image that counts: a picture (H, W) or (H, W, 3) that is not zero there, the corners
+            (K, 2) of a polygon in px, the path of a picture, or the corners as text "X1,Y1,X2,Y2,X3,Y3,…". Outside it
+            there is no foreground, and detections whose foot (from straight above: centre) is outside are left out.
+            None takes the whole image.
         progress: Called after each frame with the frame's number, from 1.
 
     Returns:
@@ -123,7 +129,7 @@ def track(
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
     rule = chosen or default_grouping()
-    prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
+    prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed, mask=mask)
     prepared.reset(seed)
     reported, spent, begun = [], 0.0, clock()
     for frame in prepared.frames():
@@ -154,6 +160,8 @@ def track(
         warnings.warn(text, UserWarning, stacklevel=2)
     speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
     info = run_info(prepared, tracks, seed, sensor or {}, scale, ground, speeds)
+    if mask is not None:
+        info["mask"] = str(mask) if isinstance(mask, str | Path) else "given as an array"
     info["events_at_end"] = events_at_end(reported, tracks, sequence.fps)
     return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
 
