@@ -33,6 +33,7 @@ from sim.pictures.background_sample import BackgroundChoice
 from sim.sequence import simulate
 from sim.types import Frame, Image, Tracks, Truth
 from sim.types import Sequence as Recording
+from tracking.detect import background, foreground
 from tracking.running.run import track
 
 SCENES = (("street", 20), ("cross", 15), ("mixed", 15), ("crowd", 20))
@@ -50,7 +51,9 @@ def coded(pictures: Pictures, codec: str, rate: int, noise: float = 0.0, tint: A
     r, file = np.random.default_rng(0), io.BytesIO()
     high, wide = pictures[0].shape[:2]
     with av.open(file, "w", format="matroska") as container:
-        stream: Any = container.add_stream(codec, rate=Fraction(FPS if codec != "mpeg2video" else 25))
+        options = {"preset": "veryfast", "mbtree": "0"} if codec == "libx264" else {}  # same pictures, same bytes
+        fps = Fraction(FPS if codec != "mpeg2video" else 25)  # MPEG-2 has no 10 frames/s
+        stream: Any = container.add_stream(codec, rate=fps, options=options)
         stream.width, stream.height, stream.pix_fmt, stream.bit_rate = wide, high, "yuv420p", 1000 * rate
         stream.codec_context.thread_count, stream.codec_context.gop_size = 1, 12
         for picture in pictures:
@@ -104,7 +107,10 @@ KINDS: dict[str, Callable[[Pictures], Pictures]] = {
     "dusk": dusk,
 }
 # Cures by name, the code that switches each off, and the kinds of pictures that it is for.
-CURES: dict[str, tuple[list[Replacement], tuple[str, ...]]] = {}
+CURES: dict[str, tuple[list[Replacement], tuple[str, ...]]] = {
+    "learned shadows": ([(background, "darkest_shadow", lambda *_: None)], ("as rendered", "grey", "tinted")),
+    "smoothing": ([(foreground, "window", lambda _: 1)], ("dusk",)),
+}
 
 
 @dataclass(frozen=True)
