@@ -16,9 +16,9 @@ Eqs 5, 6, 9, 10 are in background_kernels, eqs 3, 4, 7, 8 in background_training
 
 Departures (ours; those of the training: background_training). `dark` is a limit of alpha instead of a normalised
 threshold, and a pixel within the noise is never dark foreground. BRIGHT is a limit of alpha, too. Unless the settings
-say "trained", the model adapts, and follows the gain of each frame. If all frames of the sample are grey (R = G = B),
-chromaticity is not available: every pixel beyond the brightness thresholds is foreground, dark foreground if it is
-darker.
+say "trained", the model adapts, follows the gain of each frame, and takes the darkest shadow of the sample in place of
+`dark` (shadow_depth). If all frames of the sample are grey (R = G = B), and no shadows are found, every pixel beyond
+the brightness thresholds is foreground, dark foreground if it is darker.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ class Background:
         thresholds            3 numbers: of CD / b, lower of (alpha - 1) / a, upper of (alpha - 1) / a
         bounds                2 limits of alpha (pixel brightness over the model's): of pixels beyond the thresholds
                               those darker than the first are dark foreground, not shadow, those brighter than the
-                              second are foreground, not highlight; (1, 1) if the whole sample is grey
+                              second are foreground, not highlight; (1, 1) if the sample is grey without shadows
         settings, fps         the BackgroundSettings in use; frames per second
     """
 

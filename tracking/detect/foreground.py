@@ -38,8 +38,8 @@ SAMPLED = 25  # About so many frames of the background sample are searched for p
 class Segmented:
     """One picture of H x W px after `Foreground.segment`.
 
-    image (H, W, 3): the picture, BGR uint8, smoothed if the background sample is noisy. classes (H, W) uint8: class of each pixel: 0 BACKGROUND, 1 FOREGROUND, 2
-    DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. mask (H, W) bool: the foreground (1 and 2) after cleaning. plausible:
+    image (H, W, 3): the picture, BGR uint8, smoothed if the background sample is noisy. classes (H, W) uint8: class of
+    each pixel: 0 BACKGROUND, 1 FOREGROUND, 2 DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. mask (H, W) bool: the foreground (1 and 2) after cleaning. plausible:
     False if the background adapts and a share of the mask above MOST_FOREGROUND = 0.6 is foreground: then a light was
     switched or the camera moved.
     """
@@ -53,8 +53,10 @@ class Segmented:
 class Foreground:
     """The pipeline from a picture to foreground blobs: classify the pixels, clean the mask, find blobs, adapt.
 
-    State: model, the background model; window, side of the window (px) over which pictures are averaged; check, which warns of pictures that cannot be measured; px_per_m, the scale of the image: the context's, or, if that is nan, learned
-    from lone people, nan until then. Raises InputError for an unusable background sample, AssertionError for none.
+    State: model, the background model; window, side of the window (px) over which pictures are averaged, 1: none;
+    check, which warns of pictures that cannot be measured; px_per_m, the scale of the image: the context's, or, if that
+    is nan, learned from lone people, nan until then. Raises InputError for an unusable background sample,
+    AssertionError for none.
     """
 
     def __init__(self, context: Context, settings: BackgroundSettings) -> None:

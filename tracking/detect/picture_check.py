@@ -1,7 +1,7 @@
 """Says once what is wrong with pictures from which people cannot be measured (ours).
 
-Two things are counted over frames: frames that are mostly foreground, in which nothing is measured, and frames with more
-pieces of foreground than are looked at. A warning follows if OFTEN of at least FEWEST frames are so.
+Two things are counted: frames that are mostly foreground, in which nothing is measured, and frames with more pieces of
+foreground than are looked at. A warning follows if OFTEN of at least FEWEST frames are so.
 """
 
 from __future__ import annotations

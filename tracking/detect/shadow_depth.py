@@ -1,7 +1,7 @@
 """How dark the shadows of a scene are, from the background sample (ours).
 
 A cast shadow on the ground takes away nearly the same share of the light everywhere. So the relative brightness alpha
-of its pixels has a mode, and within a shadow alpha is even up to the noise. Clothes are of many brightnesses, and seldom
+of its pixels has a mode, and within a shadow alpha is even up to the noise. Clothes are of many brightnesses, seldom
 even where the ground has a texture. Of the pixels that are evenly darkened (shadow_depth_kernels) a histogram of alpha
 is made over the sample. Shadows are its brightest mode that has at least MODE of the highest one. They end below the
 mode where the histogram has fallen to END of it, or rises again. A darkened pixel below that end is dark foreground.
@@ -24,7 +24,7 @@ FEWEST = 50  # evenly darkened pixels of the mode and its neighbours; with fewer
 
 
 def darkest_shadow(counts: Ints, dark: float) -> float | None:
-    """Returns the alpha below which a pixel is darker than the shadows; None if there are too few evenly darkened pixels.
+    """Returns the alpha below which a pixel is darker than the shadows; None with too few evenly darkened pixels.
 
     counts (BINS,): their histogram. dark: alpha below which no pixel is shadow; the result is not below it.
     """

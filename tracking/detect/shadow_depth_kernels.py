@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sim.compiler import njit
-from sim.types import Array, Image, Ints
+from sim.types import Image, Ints
 from tracking.detect.background_kernels import DARK, SHADOW, Floats
 
 AROUND = ((-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (-1, 1), (1, -1), (1, 1))

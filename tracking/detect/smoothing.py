@@ -1,7 +1,7 @@
 """Smoothing of noisy pictures before the background model sees them (ours).
 
-In low light most of a picture's noise is independent from pixel to pixel. A mean over n x n pixels divides its standard
-deviation by n, and blurs the outlines of people by as much. So n is 1 unless the noise of the sample is above QUIET, and
+In low light most of a picture's noise is independent from pixel to pixel. A mean over n x n pixels divides its
+standard deviation by n, and blurs the outlines of people by as much. So n is 1 unless the noise of the sample is above QUIET, and
 the least odd number, up to WIDEST, with which it is not. The noise is measured in the change from one frame of the
 sample to the next, of a pixel less its right neighbour: moving people cover few pixels, and changes of light are the
 same at both.
@@ -21,8 +21,10 @@ AS_SIGMA = 0.6745 * 2  # median of the absolute value over sigma, of a sum of fo
 
 
 def independent_noise(sample: Image) -> float:
-    """Returns the standard deviation of the noise in a sample (K, H, W, 3) uint8 that is independent at each pixel, grey
-    levels: the mean over the colour channels; 0 with a single frame or column."""
+    """Returns the standard deviation of the noise in a sample (K, H, W, 3) uint8 that is independent at each pixel.
+
+    Grey levels; the mean over the colour channels; 0 with a single frame or column.
+    """
     rows, columns = grid(*sample.shape[1:3])
     right = slice(columns.start + 1, None, columns.step)
     first, second = (sample[:, rows, part].astype(np.int16) for part in (columns, right))

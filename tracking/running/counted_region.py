@@ -1,7 +1,7 @@
 """The region of the image that counts: what is outside it, such as a car park or a screen, reaches no tracker.
 
 Outside the region pictures are black, in the frames and in the background sample alike, so there is never foreground.
-Detections count if their foot is in the region: the middle of the box's lower edge, seen from straight above its centre.
+Detections count if their foot is in the region: the middle of the box's lower edge, from straight above its centre.
 A person who stands at the region's border is cut off there in pictures. Tracks are reported wherever they are.
 """
 

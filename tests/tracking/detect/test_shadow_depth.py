@@ -20,19 +20,22 @@ def mode(middle: float, width: float, height: float) -> np.ndarray:
 @pytest.mark.parametrize("width", [0.015, 0.03])
 def test_the_limit_is_below_the_mode_of_shadows_by_their_width(shadow: float, width: float) -> None:
     found = darkest_shadow(mode(shadow, width, 5000), 0.5)
-    assert found is not None and shadow - 2.2 * width - 0.03 <= found <= shadow - 1.5 * width + 0.01
+    assert found is not None
+    assert shadow - 2.2 * width - 0.03 <= found <= shadow - 1.5 * width + 0.01
 
 
 def test_clothes_are_no_shadows_though_they_are_many() -> None:
     clothes = mode(0.55, 0.05, 3000) + mode(0.3, 0.1, 50_000)
     found = darkest_shadow(clothes + mode(0.84, 0.02, 5000), 0.5)
-    assert found is not None and 0.75 < found < 0.84
+    assert found is not None
+    assert 0.75 < found < 0.84
 
 
 def test_rough_counts_do_not_end_the_mode() -> None:
     wide = np.where(np.arange(BINS) % 4 == 0, 0.8, 1.0) * mode(0.85, 0.05, 400)
     found = darkest_shadow(wide.astype(np.int64), 0.5)
-    assert found is not None and found < 0.78
+    assert found is not None
+    assert found < 0.78
 
 
 def test_the_setting_is_the_least_limit_and_few_pixels_tell_nothing() -> None:
