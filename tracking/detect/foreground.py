@@ -39,9 +39,9 @@ class Segmented:
     """One picture of H x W px after `Foreground.segment`.
 
     image (H, W, 3): the picture, BGR uint8, smoothed if the background sample is noisy. classes (H, W) uint8: class of
-    each pixel: 0 BACKGROUND, 1 FOREGROUND, 2 DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. mask (H, W) bool: the foreground (1 and 2) after cleaning. plausible:
-    False if the background adapts and a share of the mask above MOST_FOREGROUND = 0.6 is foreground: then a light was
-    switched or the camera moved.
+    each pixel: 0 BACKGROUND, 1 FOREGROUND, 2 DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. mask (H, W) bool: the
+    foreground (1 and 2) after cleaning. plausible: False if the background adapts and a share of the mask above
+    MOST_FOREGROUND = 0.6 is foreground: then a light was switched or the camera moved.
     """
 
     image: Image

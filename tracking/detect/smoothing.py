@@ -1,10 +1,10 @@
 """Smoothing of noisy pictures before the background model sees them (ours).
 
 In low light most of a picture's noise is independent from pixel to pixel. A mean over n x n pixels divides its
-standard deviation by n, and blurs the outlines of people by as much. So n is 1 unless the noise of the sample is above QUIET, and
-the least odd number, up to WIDEST, with which it is not. The noise is measured in the change from one frame of the
-sample to the next, of a pixel less its right neighbour: moving people cover few pixels, and changes of light are the
-same at both.
+standard deviation by n, and blurs the outlines of people by as much. So n is 1 unless the noise of the sample is above
+QUIET, and the least odd number, up to WIDEST, with which it is not. The noise is measured in the change from one frame
+of the sample to the next, of a pixel less its right neighbour: moving people cover few pixels, and changes of light
+are the same at both.
 """
 
 from __future__ import annotations
