@@ -7,16 +7,18 @@ A person who stands at the region's border is cut off there in pictures. Tracks 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from scenarios.errors import InputError, reject
 from sim.pictures.picture_folder import SUFFIXES, read_picture
-from sim.types import Bools, Detections, Frame, Image, Sequence
+from sim.types import Array, Bools, Detections, Frame, Image, Sequence
 
 # A picture (H, W) or (H, W, 3), not zero in the region; corners (K, 2) of a polygon, px; the path of a picture; or text
 # "X1,Y1,X2,Y2,X3,Y3,…".
@@ -33,11 +35,13 @@ def counted_region(mask: Mask, size: tuple[int, int] | None) -> Bools:
     if size is None:
         raise InputError(place=PLACE, got="a sequence whose size in px is unknown", expected="pictures", remedy=remedy)
     file = Path(mask) if isinstance(mask, str | Path) and Path(mask).suffix.lower() in SUFFIXES else None
+    found: NDArray[Any]
     if file is not None:
-        found = read_picture(file)
-        if found is None:
+        picture = read_picture(file)
+        if picture is None:
             got = "no picture that can be read" if file.is_file() else "no such file"
             raise InputError(file=file, place=PLACE, got=got, expected=POLYGON, remedy="check the path")
+        found = picture
     else:
         found = _corners(mask) if isinstance(mask, str | Path) else np.asarray(mask)
     if found.ndim == 2 and found.shape[1] == 2 and found.shape != size[::-1]:
@@ -50,7 +54,7 @@ def counted_region(mask: Mask, size: tuple[int, int] | None) -> Bools:
     return inside
 
 
-def _corners(text: str | Path) -> np.ndarray:
+def _corners(text: str | Path) -> Array:
     try:
         found = np.array([float(word) for word in str(text).split(",")])
     except ValueError:
@@ -61,26 +65,33 @@ def _corners(text: str | Path) -> np.ndarray:
     return found.reshape(-1, 2)
 
 
-def _polygon(corners: np.ndarray, size: tuple[int, int]) -> Bools:
+def _polygon(corners: NDArray[Any], size: tuple[int, int]) -> Bools:
     from tracking.export.tidy_tables import inside
 
     u, v = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
-    return inside(np.column_stack([u.ravel(), v.ravel()]), corners.astype(float)).reshape(size[::-1])
+    return np.asarray(inside(np.column_stack([u.ravel(), v.ravel()]), corners.astype(float)).reshape(size[::-1]))
 
 
 def with_masked_pictures(sequence: Sequence, region: Bools) -> Sequence:
     """Returns the sequence with pictures, also of the background sample, that are black outside the region (H, W)."""
 
     def masked(pictures: Image) -> Image:
-        return pictures * region[..., None]
+        return np.asarray(pictures * region[..., None], np.uint8)
+
+    def masked_view(picture: Image | None) -> Image | None:
+        return None if picture is None else masked(picture)
 
     def frames() -> Iterator[Frame]:
         for frame in sequence.frames():
-            views = {name: getattr(frame, name) for name in ("image", "right")}
-            yield replace(frame, **{k: None if picture is None else masked(picture) for k, picture in views.items()})
+            yield replace(frame, image=masked_view(frame.image), right=masked_view(frame.right))
 
     sample = sequence.load_background
-    return replace(sequence, frames=frames, load_background=None if sample is None else lambda: masked(sample()))
+    load = None if sample is None else partial(_masked_sample, sample, masked)
+    return replace(sequence, frames=frames, load_background=load)
+
+
+def _masked_sample(load: Callable[[], Image], masked: Callable[[Image], Image]) -> Image:
+    return masked(load())
 
 
 def detections_inside(found: Detections, region: Bools, above: bool) -> Detections:
