@@ -59,6 +59,7 @@ class PreparedTracker:
     frames_given: tuple[Frame, ...] | None
     given: InputFrames | None = None  # as `frames_given`, and what these were chosen from
     scale_frames: int = 0  # as of ImageScale
+    masked: Sequence | None = None  # `sequence` with pictures that are black outside the region that counts
     history: ReportHistory = field(default_factory=ReportHistory)  # what the tracker has reported since `reset`
     planes: PlaneCheck = field(default_factory=PlaneCheck)  # the same, compared with its input
 
@@ -71,7 +72,7 @@ class PreparedTracker:
         """Returns a new iterator over the frames as the tracker gets them, in order. Each call starts at frame 1."""
         if self.frames_given is not None:
             return iter(self.frames_given)
-        return (replace(f, detections=None) for f in self.sequence)
+        return (replace(f, detections=None) for f in self.masked or self.sequence)
 
     def scale(self, tracks: SequenceOf[Tracks]) -> ImageScale:
         """Returns the image scale for deriving groups from the tracks of frames 1 to now; nan if unknown. It is the
@@ -190,19 +191,20 @@ def prepare(
     else:
         given = inputs(mode, instance.needs, seed)
     frames, scale = given.frames, given.scale
+    masked: Sequence | None = None
     if mask is not None:
         region = counted_region(mask, sequence.image_size)
         above = sequence.camera is not None and sequence.camera.kind == "top"
         if frames is None:
-            sequence = with_masked_pictures(sequence, region)
+            masked = with_masked_pictures(sequence, region)
         else:
             frames = tuple(
                 f if f.detections is None else replace(f, detections=detections_inside(f.detections, region, above))
                 for f in frames
             )
-    background = sequence.background() if mode == "image" else None
+    background = (masked or sequence).background() if mode == "image" else None
     context = Context(sequence.fps, scale.px_per_m, sequence.camera, sequence.scene, sequence.image_size, background)
-    return PreparedTracker(name, instance, config, context, mode, sequence, frames, given, scale.frames)
+    return PreparedTracker(name, instance, config, context, mode, sequence, frames, given, scale.frames, masked)
 
 
 def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> tuple[str, Tracker, Config | None]:
