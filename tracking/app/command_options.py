@@ -174,6 +174,9 @@ class TrackOptions(SceneOptions, BoxOptions, words="track"):
     background: str | None = option(
         "Frames a background model is trained on, or a picture of the empty place.", None,
         metavar="first:N|learn:N|spread:N|PICTURE")
+    mask: str | None = option(
+        "The region of the image that counts: a picture that is not black there, or a polygon in px.", None,
+        metavar="PICTURE|X1,Y1,X2,Y2,X3,Y3,…")
     step_timeout: float | None = STEP_TIMEOUT()
     min_score: float | None = option("Leave out boxes with a lower score, as it stands in their file.", None)
     follow: float | None = option(

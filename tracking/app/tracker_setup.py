@@ -24,6 +24,7 @@ class TrackerSetup:
     seed: int = 0
     grouping: Grouping | None = None
     limited: TimeLimited | None = None  # the tracker with a limit of time for each step
+    mask: str | None = None  # the region of the image that counts
 
     def run(
         self, sequence: Sequence, progress: Callable[[int], None] | None = None,
@@ -35,5 +36,6 @@ class TrackerSetup:
 
         return track(
             self.limited or self.tracker, sequence, params=self.config, detections=self.detections,
-            sensor=self.sensor, seed=self.seed, grouping=self.grouping, progress=progress, if_stopped=if_stopped,
+            sensor=self.sensor, seed=self.seed, grouping=self.grouping, mask=self.mask, progress=progress,
+            if_stopped=if_stopped,
         )  # fmt: skip

@@ -16,9 +16,9 @@ Eqs 5, 6, 9, 10 are in background_kernels, eqs 3, 4, 7, 8 in background_training
 
 Departures (ours; those of the training: background_training). `dark` is a limit of alpha instead of a normalised
 threshold, and a pixel within the noise is never dark foreground. BRIGHT is a limit of alpha, too. Unless the settings
-say "trained", the model adapts, and follows the gain of each frame. If all frames of the sample are grey (R = G = B),
-chromaticity is not available: every pixel beyond the brightness thresholds is foreground, dark foreground if it is
-darker.
+say "trained", the model adapts, follows the gain of each frame, and takes the darkest shadow of the sample in place of
+`dark` (shadow_depth). If all frames of the sample are grey (R = G = B), and no shadows are found, every pixel beyond
+the brightness thresholds is foreground, dark foreground if it is darker.
 """
 
 from __future__ import annotations
@@ -40,6 +40,8 @@ from tracking.detect.background_kernels import Floats
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.background_training import check_frame, thresholds, train
 from tracking.detect.background_training_kernels import FLOOR
+from tracking.detect.shadow_depth import BINS, SAMPLED, darkest_shadow
+from tracking.detect.shadow_depth_kernels import count_even
 
 # Relative brightness above which a brightened pixel is foreground, not highlight (ours). Light shirts are 15 to 30 %
 # brighter than a grey floor; at 1.3 a third of their pixels are missed.
@@ -62,7 +64,7 @@ class Background:
         thresholds            3 numbers: of CD / b, lower of (alpha - 1) / a, upper of (alpha - 1) / a
         bounds                2 limits of alpha (pixel brightness over the model's): of pixels beyond the thresholds
                               those darker than the first are dark foreground, not shadow, those brighter than the
-                              second are foreground, not highlight; (1, 1) if the whole sample is grey
+                              second are foreground, not highlight; (1, 1) if the sample is grey without shadows
         settings, fps         the BackgroundSettings in use; frames per second
     """
 
@@ -88,7 +90,10 @@ class Background:
         self._grid_background = self.valid[self._grid]
         self._first_row = 0
         self._grey = bool((sample[..., :1] == sample).all())
+        self._darkened = np.zeros(BINS, np.int64)
         self.follow(self.settings)
+        if self.settings.adaptive:
+            self._learn_shadows(sample)
 
     def follow(self, settings: BackgroundSettings) -> None:
         """Replaces the settings: thresholds and limits of brightness are computed anew, mean, variance and gain stay as
@@ -96,7 +101,10 @@ class Background:
         """
         self.settings = settings
         self.thresholds = thresholds(self._counts, settings.detection_rate)
-        self.bounds = (1.0, 1.0) if self._grey else (settings.dark, BRIGHT if settings.adaptive else math.inf)
+        bright = BRIGHT if settings.adaptive else math.inf
+        unknown = (1.0, 1.0) if self._grey else (settings.dark, bright)
+        shadows = darkest_shadow(self._darkened, settings.dark) if settings.adaptive else None
+        self.bounds = unknown if shadows is None else (shadows, bright)
 
     def classify(self, image: Image) -> Image:
         """Returns the class of each pixel of a frame (H, W, 3) BGR uint8, as (H, W) uint8.
@@ -154,6 +162,14 @@ class Background:
         self.var[:, where] = np.square(self.noise)[:, None]
         self.s[where], self.b[where] = np.median(self.s[self.valid]), np.median(self.b[self.valid])
         self.valid[where] = True
+
+    def _learn_shadows(self, sample: Image) -> None:
+        s = np.where(self.valid, self.s, np.float32(1))
+        for image in sample[:: max(len(sample) // SAMPLED, 1)]:
+            classes = self.classify(image)
+            count_even(colour_planes(image), classes, self.mean, self.var, s, self.gain, self._darkened)
+        self.gain, self._grid_background = np.ones(3, np.float32), self.valid[self._grid]
+        self.follow(self.settings)
 
     def _estimate_gain(self, image: Image) -> Floats:
         seen = np.moveaxis(image[self._grid], -1, 0).astype(np.float32)

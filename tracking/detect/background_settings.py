@@ -18,8 +18,8 @@ class BackgroundSettings(Config):
     detection_rate: float = param(0.9995, (0.9, 0.999999), "probability",
         "from pixels: share of the sample's background that each threshold leaves background", "log", sees="pixels")
     dark: float = param(0.5, (0.0, 1.0), "",
-        "from pixels: relative brightness; a darkened pixel below it is foreground, else shadow; lower it if shadows "
-        "become people, raise it if dark clothes are missed", sees="pixels")
+        "from pixels: relative brightness; a darkened pixel below it is foreground, else shadow; an adaptive "
+        "background raises it to the darkest shadow of its sample; raise it if dark clothes are missed", sees="pixels")
     background: str = param("adaptive", ("adaptive", "trained"), "",
         "from pixels: follows light and scene (ours) or stays as trained", "categorical", sees="pixels", online=False)
     background_time: float = param(20.0, (1.0, 1000.0), "s",

@@ -25,6 +25,9 @@ from tracking.detect import blobs_kernels as kernels
 Labels = NDArray[np.int32]
 # Windows of the three operations, m. Opening removes narrower parts of the foreground, closing fills narrower gaps.
 MAJORITY_M, OPEN_M, CLOSE_M = 0.08, 0.05, 0.15
+# Regions of a mask that are looked at, the largest first. It bounds the work of a frame of noise, whose thousands of
+# pieces would all become tracks.
+MOST = 500
 # px: least disc of the opening. One pixel is no opening, which is so up to 40 px per m. At 20 px per m a disc of 3 px
 # is as wide as a head; it costs HOTA (`python -m benchmarks.foreground opening`).
 LEAST_OPEN = 1
@@ -92,12 +95,12 @@ def disc(size: int) -> Image:
 
 def find(mask: Bools, min_area: float) -> Blobs:
     """Returns the connected regions (8 neighbours) of a foreground mask (H, W) bool that have at least `min_area`
-    pixels."""
+    pixels; of more than MOST = 500 the largest."""
     runs = kernels.find_runs(np.ascontiguousarray(mask))
     first, region = np.unique(kernels.connect(runs), return_inverse=True)
     box, area, centre, spread = kernels.moments(runs, region, len(first))
     order = np.argsort(-area, kind="stable")  # of equal regions that of the first pixel comes first
-    order = order[area[order] >= min_area]
+    order = order[area[order] >= min_area][:MOST]
     number = np.zeros(len(first), np.int32)
     number[order] = np.arange(1, len(order) + 1)
     label = np.zeros(mask.shape, np.int32)

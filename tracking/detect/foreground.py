@@ -1,7 +1,8 @@
 """The pipeline from a picture to foreground blobs that all trackers from pixels share.
 
 For each picture, in this order:
-    segment    classify each pixel (Gonzalez et al. 2006, sec. 3.2), fuse the foreground classes, clean them (sec. 3.3);
+    segment    average noisy pictures over small windows (smoothing, ours);
+               classify each pixel (Gonzalez et al. 2006, sec. 3.2), fuse the foreground classes, clean them (sec. 3.3);
                where the background adapts, the result is implausible if more of the image is foreground than people
                can cover (ours)
     ...        the tracker measures its people and says which pixels they cover (protected)
@@ -23,6 +24,8 @@ from tracking.detect.background import Background, fused_foreground
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.ghosts import Ghosts, uncovered_in_sample
 from tracking.detect.person_size import PersonSize
+from tracking.detect.picture_check import PictureCheck
+from tracking.detect.smoothing import independent_noise, smoothed, window
 
 # m^2 at the image's scale, and px: a blob that is smaller than either is noise.
 LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0
@@ -35,10 +38,10 @@ SAMPLED = 25  # About so many frames of the background sample are searched for p
 class Segmented:
     """One picture of H x W px after `Foreground.segment`.
 
-    image (H, W, 3): the picture, BGR uint8. classes (H, W) uint8: class of each pixel: 0 BACKGROUND, 1 FOREGROUND, 2
-    DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. mask (H, W) bool: the foreground (1 and 2) after cleaning. plausible:
-    False if the background adapts and a share of the mask above MOST_FOREGROUND = 0.6 is foreground: then a light was
-    switched or the camera moved.
+    image (H, W, 3): the picture, BGR uint8, smoothed if the background sample is noisy. classes (H, W) uint8: class of
+    each pixel: 0 BACKGROUND, 1 FOREGROUND, 2 DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. mask (H, W) bool: the
+    foreground (1 and 2) after cleaning. plausible: False if the background adapts and a share of the mask above
+    MOST_FOREGROUND = 0.6 is foreground: then a light was switched or the camera moved.
     """
 
     image: Image
@@ -50,8 +53,10 @@ class Segmented:
 class Foreground:
     """The pipeline from a picture to foreground blobs: classify the pixels, clean the mask, find blobs, adapt.
 
-    State: model, the background model; px_per_m, the scale of the image: the context's, or, if that is nan, learned
-    from lone people, nan until then. Raises InputError for an unusable background sample, AssertionError for none.
+    State: model, the background model; window, side of the window (px) over which pictures are averaged, 1: none;
+    check, which warns of pictures that cannot be measured; px_per_m, the scale of the image: the context's, or, if that
+    is nan, learned from lone people, nan until then. Raises InputError for an unusable background sample,
+    AssertionError for none.
     """
 
     def __init__(self, context: Context, settings: BackgroundSettings) -> None:
@@ -61,7 +66,12 @@ class Foreground:
         """
         assert context.background is not None
         self.px_per_m, self._learns = context.px_per_m, bool(np.isnan(context.px_per_m))
-        self.model = Background(context.background, context.fps, settings)
+        self.window = window(independent_noise(context.background)) if settings.adaptive else 1
+        sample = context.background
+        if self.window > 1:
+            sample = np.stack([smoothed(image, self.window) for image in sample])
+        self.model = Background(sample, context.fps, settings)
+        self.check, self._complete = PictureCheck(), True
         self.ghosts = Ghosts(self.shape, self.model.noise, context.fps) if settings.adaptive else None
         if settings.adaptive:
             self.model.mend(uncovered_in_sample(self.model.mean, self.model.second, self.scale), self.model.second)
@@ -91,6 +101,7 @@ class Foreground:
         The background model does not learn from the picture; only its estimate of the picture's brightness changes.
         Raises InputError if the picture's size or dtype is not that of the background sample.
         """
+        image = smoothed(image, self.window)
         classes = self.model.classify(image)
         mask = blobs.clean(fused_foreground(classes), self.scale)
         flooded = self.model.settings.adaptive and np.count_nonzero(mask) / mask.size > MOST_FOREGROUND
@@ -103,6 +114,7 @@ class Foreground:
         every fourth row. Ghosts are replaced also where `protected` is True, but not in an implausible picture.
         """
         self.model.adapt(seen.image, seen.classes, protected)
+        self.check.add(seen.plausible, self._complete, self.model.noise)
         if seen.plausible and self.ghosts is not None:
             model = self.model
             found = self.ghosts.find(seen.image, model.gain, seen.mask, model.mean, self.scale, self.least_area)
@@ -114,9 +126,11 @@ class Foreground:
         largest first.
 
         They have at least 0.0125 m^2 at the image's scale, and at least 12 pixels (sec. 3.3). No such blob gives 0
-        rows.
+        rows; of more than 500 the largest are returned.
         """
-        return blobs.find(mask, self.least_area)
+        found = blobs.find(mask, self.least_area)
+        self._complete = len(found) < blobs.MOST
+        return found
 
     def learn_person_size(self, size: PersonSize, sample: Image) -> None:
         """Lets `size` learn, in place, from the blobs of a background sample (K, H, W, 3) BGR uint8.

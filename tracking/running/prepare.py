@@ -26,6 +26,7 @@ from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping
 from tracking.running import image_scale, tracker_registry
 from tracking.running.completion import Completion
+from tracking.running.counted_region import Mask, counted_region, detections_inside, with_masked_pictures
 from tracking.running.detection_mode import (
     InputKind,
     as_frames,
@@ -62,6 +63,7 @@ class PreparedTracker:
     given: InputFrames | None = None  # as `frames_given`, and what these were chosen from
     scale_frames: int = 0  # as of ImageScale
     untracked: int = 0  # first frames, in which a background is learned and nobody is tracked
+    masked: Sequence | None = None  # `sequence` with pictures that are black outside the region that counts
     history: ReportHistory = field(default_factory=ReportHistory)  # what the tracker has reported since `reset`
     planes: PlaneCheck = field(default_factory=PlaneCheck)  # the same, compared with its input
 
@@ -74,7 +76,7 @@ class PreparedTracker:
         """Returns a new iterator over the frames as the tracker gets them, in order. Each call starts at frame 1."""
         if self.frames_given is not None:
             return iter(self.frames_given)
-        return (replace(f, detections=None) for f in self.sequence)
+        return (replace(f, detections=None) for f in self.masked or self.sequence)
 
     def scale(self, tracks: SequenceOf[Tracks]) -> ImageScale:
         """Returns the image scale for deriving groups from the tracks of frames 1 to now; nan if unknown. It is the
@@ -180,6 +182,7 @@ def prepare(
     detections: DetectionMode | None = None,
     sensor: Mapping[str, Any] | None = None,
     seed: int = 0,
+    mask: Mask | None = None,
     inputs: Callable[[DetectionMode, tuple[str, ...], int], InputFrames] | None = None,
 ) -> PreparedTracker:
     """Returns the tracker with all that it needs for the sequence; the arguments are as in `tracking.track`. inputs:
@@ -204,10 +207,23 @@ def prepare(
     else:
         given = inputs(mode, instance.needs, seed)
     frames, scale = given.frames, given.scale
-    background = sequence.background() if mode == "image" else None
+    masked: Sequence | None = None
+    if mask is not None:
+        region = counted_region(mask, sequence.image_size)
+        above = sequence.camera is not None and sequence.camera.kind == "top"
+        if frames is None:
+            masked = with_masked_pictures(sequence, region)
+        else:
+            frames = tuple(
+                f if f.detections is None else replace(f, detections=detections_inside(f.detections, region, above))
+                for f in frames
+            )
+    background = (masked or sequence).background() if mode == "image" else None
     context = Context(sequence.fps, scale.px_per_m, sequence.camera, sequence.scene, sequence.image_size, background)
     untracked = untracked_frames(sequence.load_background) if mode == "image" else 0
-    return PreparedTracker(name, instance, config, context, mode, sequence, frames, given, scale.frames, untracked)
+    return PreparedTracker(
+        name, instance, config, context, mode, sequence, frames, given, scale.frames, untracked, masked
+    )
 
 
 def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> tuple[str, Tracker, Config | None]:

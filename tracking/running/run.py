@@ -21,6 +21,7 @@ from tracking.export.table_options import TableOptions
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
 from tracking.keyword_options import documented
 from tracking.running import image_scale
+from tracking.running.counted_region import Mask
 from tracking.running.prepare import Params, prepare
 from tracking.running.run_info import OF_TRACKS, facts_of_tracks, run_info
 from tracking.running.time_limit import TimeLimited
@@ -96,6 +97,7 @@ def track(
     sensor: Mapping[str, Any] | None = None,
     seed: int = 0,
     grouping: Grouping | str | Path | None = None,
+    mask: Mask | None = None,
     progress: Callable[[int], None] | None = None,
     if_stopped: Callable[[TrackingRun], None] | None = None,
 ) -> TrackingRun:
@@ -117,6 +119,10 @@ def track(
         seed: Seed of the random numbers of tracker and sensor.
         grouping: How groups are derived: "belief", "rule", a TOML file of either, or a `Belief` or `LinkRule`. None
             takes the belief.
+        mask: The region of the image that counts: a picture (H, W) or (H, W, 3) that is not zero there, the corners
+            (K, 2) of a polygon in px, the path of a picture, or the corners as text "X1,Y1,X2,Y2,X3,Y3,…". Outside it
+            there is no foreground, and detections whose foot (from straight above: centre) is outside are left out.
+            None takes the whole image.
         progress: Called after each frame with the frame's number, from 1.
         if_stopped: Called with the run so far if an error or Ctrl-C ends it early, before that is raised.
 
@@ -133,6 +139,7 @@ def track(
     from tracking.running.live import RunningTracker
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
+<<<<<<< HEAD
     prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
     running = RunningTracker(prepared, chosen or default_grouping(), seed)
     reported, spent, begun = list[Tracks](), 0.0, clock()
@@ -170,6 +177,26 @@ def _completed(
     prepared, completion = running.prepared, running.completion
     tracks = [*completion.add(reported), *completion.rest()]
     tracks = [*tracks[:-1], *(completion.with_events_at_end(last) for last in tracks[-1:])]
+=======
+    rule = chosen or default_grouping()
+    prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed, mask=mask)
+    prepared.reset(seed)
+    reported, spent, begun = [], 0.0, clock()
+    for frame in prepared.frames():
+        start = clock()
+        reported.append(prepared.step(frame))
+        spent += clock() - start
+        if len(reported) == 1:
+            prepared.diagnostics(f"frame {frame.index}")
+        if progress is not None:
+            progress(frame.index)
+    whole = clock() - begun
+    scale, known = prepared.scale(reported), prepared.context
+    tracks, ground = completed(
+        reported, sequence.fps, scale.px_per_m, rule, camera=known.camera, scene=known.scene,
+        source=prepared.input, image_size=known.image_size,
+    )  # fmt: skip
+>>>>>>> pictures
     named, late, odd = names_groups(reported), late_groups(reported), list[str]()
     if named and chosen is not None:
         odd.append(f"{prepared.name} names groups itself: --grouping has no effect")
@@ -181,10 +208,20 @@ def _completed(
     if named and groups_alone(reported):
         odd.append(f"{prepared.name}: each of its groups has one member. Give group -1 to people who are alone")
     for text in odd:
+<<<<<<< HEAD
         warnings.warn(text, UserWarning, stacklevel=4)
     info = run_info(prepared, tracks, seed, run_sensor, completion.scale, completion.ground, speeds)
     info["events_at_end"] = events_at_end(reported, tracks, prepared.sequence.fps)
     return TrackingRun(tuple(tracks), info if named else {**info, "grouping": completion.rule.as_dict()})
+=======
+        warnings.warn(text, UserWarning, stacklevel=2)
+    speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
+    info = run_info(prepared, tracks, seed, sensor or {}, scale, ground, speeds)
+    if mask is not None:
+        info["mask"] = str(mask) if isinstance(mask, str | Path) else "given as an array"
+    info["events_at_end"] = events_at_end(reported, tracks, sequence.fps)
+    return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
+>>>>>>> pictures
 
 
 def group(

@@ -123,7 +123,7 @@ def _setup(options: TrackOptions) -> TrackerSetup:
     if options.boxes is not None and detections != "file":
         got, remedy = f"--detections {detections}", "leave --boxes or --detections out"
         raise InputError(place="--boxes", got=got, expected="--detections file", remedy=remedy)
-    return TrackerSetup(options.tracker, config, detections, sensor, options.seed, rule, limited)
+    return TrackerSetup(options.tracker, config, detections, sensor, options.seed, rule, limited, options.mask)
 
 
 def _config(tracker: str, params: str | None, settings: list[str]) -> Config | None:
