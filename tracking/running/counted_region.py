@@ -66,7 +66,7 @@ def _corners(text: str | Path) -> Array:
 
 
 def _polygon(corners: NDArray[Any], size: tuple[int, int]) -> Bools:
-    from tracking.export.tidy_tables import inside
+    from tracking.export.places import inside
 
     u, v = np.meshgrid(np.arange(size[0]) + 0.5, np.arange(size[1]) + 0.5)
     return np.asarray(inside(np.column_stack([u.ravel(), v.ravel()]), corners.astype(float)).reshape(size[::-1]))
@@ -75,23 +75,23 @@ def _polygon(corners: NDArray[Any], size: tuple[int, int]) -> Bools:
 def with_masked_pictures(sequence: Sequence, region: Bools) -> Sequence:
     """Returns the sequence with pictures, also of the background sample, that are black outside the region (H, W)."""
 
-    def masked(pictures: Image) -> Image:
-        return np.asarray(pictures * region[..., None], np.uint8)
-
-    def masked_view(picture: Image | None) -> Image | None:
-        return None if picture is None else masked(picture)
-
     def frames() -> Iterator[Frame]:
         for frame in sequence.frames():
-            yield replace(frame, image=masked_view(frame.image), right=masked_view(frame.right))
+            image, right = (inside_region(picture, region) for picture in (frame.image, frame.right))
+            yield replace(frame, image=image, right=right)
 
     sample = sequence.load_background
-    load = None if sample is None else partial(_masked_sample, sample, masked)
+    load = None if sample is None else partial(_masked_sample, sample, region)
     return replace(sequence, frames=frames, load_background=load)
 
 
-def _masked_sample(load: Callable[[], Image], masked: Callable[[Image], Image]) -> Image:
-    return masked(load())
+def _masked_sample(load: Callable[[], Image], region: Bools) -> Image:
+    return np.asarray(load() * region[..., None], np.uint8)
+
+
+def inside_region(picture: Image | None, region: Bools) -> Image | None:
+    """Returns a picture (H, W, 3), or none, black outside the region (H, W)."""
+    return None if picture is None else np.asarray(picture * region[..., None], np.uint8)
 
 
 def detections_inside(found: Detections, region: Bools, above: bool) -> Detections:

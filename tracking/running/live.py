@@ -24,6 +24,7 @@ from sim.pictures.background_sample import BackgroundChoice, GivenSample, parse_
 from sim.scene.camera import BOXES
 from sim.types import (
     Array,
+    Bools,
     Camera,
     DetectionMode,
     Detections,
@@ -40,6 +41,7 @@ from sim.types import (
 from tracking.grouping.ground_of_boxes import LONGEST
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
 from tracking.running import image_scale
+from tracking.running.counted_region import Mask, counted_region, detections_inside, inside_region
 from tracking.running.detection_mode import Given, as_needed
 from tracking.running.prepare import Params, PreparedTracker, prepare
 from tracking.running.run_info import run_info
@@ -129,6 +131,7 @@ class Live:
         background: Frames from which a background is learned: "learn:N", the first N; or pictures (K, H, W, 3), BGR, of
             the place. None: the first 10 s.
         grouping: As in `tracking.track`.
+        mask: As in `tracking.track`.
         seed: As in `tracking.track`.
         name: Of the run, in messages.
 
@@ -146,7 +149,7 @@ class Live:
         self, tracker: str | type[Tracker] | Tracker | TimeLimited, *, fps: float, px_per_m: float | None = None,
         params: Params = None, camera: Camera | str | Path | None = None, scene: Scene | None = None,
         image_size: tuple[int, int] | None = None, background: str | Image | None = None,
-        grouping: Grouping | str | Path | None = None, seed: int = 0, name: str = "live",
+        grouping: Grouping | str | Path | None = None, mask: Mask | None = None, seed: int = 0, name: str = "live",
     ) -> None:  # fmt: skip
         for option, value, (low, high) in (("fps", fps, FRAME_RATES), ("px_per_m", px_per_m, SCALES)):
             if value is not None and not is_number(value, low, high):
@@ -165,6 +168,8 @@ class Live:
             name, float(fps), None, _no_frames, image_size=image_size, camera=camera, scene=scene, px_per_m=scale,
             source={"kind": "live", "path": name},
         )  # fmt: skip
+        self.mask = mask
+        self.region: Bools | None = None
         self.index = self.frames = self.boxes = 0
         self.unobserved: list[tuple[int, int]] = []
         self.zero = 0.0
@@ -260,7 +265,13 @@ class Live:
         if self.mode == "file" and image is not None:
             remedy = "give pictures from the first frame on, or never"
             raise InputError(place=f"frame {index}", got="a picture", expected="boxes or points", remedy=remedy)
-        return Frame(index, t, image, right, found)
+        if self.mask is None:
+            return Frame(index, t, image, right, found)
+        if self.region is None:
+            self.region = counted_region(self.mask, self.sequence.image_size)
+        above = self.sequence.camera is not None and self.sequence.camera.kind == "top"
+        found = None if found is None else detections_inside(found, self.region, above)
+        return Frame(index, t, inside_region(image, self.region), inside_region(right, self.region), found)
 
     def _take(self, frame: Frame) -> list[Tracks]:
         """Returns the tracks, of this frame or of earlier ones, too, that are completed now."""

@@ -139,14 +139,16 @@ def track(
     from tracking.running.live import RunningTracker
 
     chosen = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping
-<<<<<<< HEAD
-    prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed)
+    prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed, mask=mask)
     running = RunningTracker(prepared, chosen or default_grouping(), seed)
     reported, spent, begun = list[Tracks](), 0.0, clock()
 
     def made() -> TrackingRun:
         speeds = (len(reported) / spent, len(reported) / (clock() - begun)) if reported else (0.0, 0.0)
-        return _completed(running, reported, chosen, run_sensor=sensor or {}, seed=seed, speeds=speeds)
+        run = _completed(running, reported, chosen, run_sensor=sensor or {}, seed=seed, speeds=speeds)
+        if mask is None:
+            return run
+        return replace(run, info={**run.info, "mask": "an array" if not isinstance(mask, str | Path) else str(mask)})
 
     try:
         for frame in prepared.frames():
@@ -177,26 +179,6 @@ def _completed(
     prepared, completion = running.prepared, running.completion
     tracks = [*completion.add(reported), *completion.rest()]
     tracks = [*tracks[:-1], *(completion.with_events_at_end(last) for last in tracks[-1:])]
-=======
-    rule = chosen or default_grouping()
-    prepared = prepare(tracker, sequence, params=params, detections=detections, sensor=sensor, seed=seed, mask=mask)
-    prepared.reset(seed)
-    reported, spent, begun = [], 0.0, clock()
-    for frame in prepared.frames():
-        start = clock()
-        reported.append(prepared.step(frame))
-        spent += clock() - start
-        if len(reported) == 1:
-            prepared.diagnostics(f"frame {frame.index}")
-        if progress is not None:
-            progress(frame.index)
-    whole = clock() - begun
-    scale, known = prepared.scale(reported), prepared.context
-    tracks, ground = completed(
-        reported, sequence.fps, scale.px_per_m, rule, camera=known.camera, scene=known.scene,
-        source=prepared.input, image_size=known.image_size,
-    )  # fmt: skip
->>>>>>> pictures
     named, late, odd = names_groups(reported), late_groups(reported), list[str]()
     if named and chosen is not None:
         odd.append(f"{prepared.name} names groups itself: --grouping has no effect")
@@ -208,20 +190,10 @@ def _completed(
     if named and groups_alone(reported):
         odd.append(f"{prepared.name}: each of its groups has one member. Give group -1 to people who are alone")
     for text in odd:
-<<<<<<< HEAD
         warnings.warn(text, UserWarning, stacklevel=4)
     info = run_info(prepared, tracks, seed, run_sensor, completion.scale, completion.ground, speeds)
     info["events_at_end"] = events_at_end(reported, tracks, prepared.sequence.fps)
     return TrackingRun(tuple(tracks), info if named else {**info, "grouping": completion.rule.as_dict()})
-=======
-        warnings.warn(text, UserWarning, stacklevel=2)
-    speeds = (len(reported) / spent, len(reported) / whole) if reported else (0.0, 0.0)
-    info = run_info(prepared, tracks, seed, sensor or {}, scale, ground, speeds)
-    if mask is not None:
-        info["mask"] = str(mask) if isinstance(mask, str | Path) else "given as an array"
-    info["events_at_end"] = events_at_end(reported, tracks, sequence.fps)
-    return TrackingRun(tracks, info if named else {**info, "grouping": rule.as_dict()})
->>>>>>> pictures
 
 
 def group(

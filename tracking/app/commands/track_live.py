@@ -128,7 +128,7 @@ class _LiveRun:
         self.live = Live(
             setup.limited or setup.tracker, fps=fps, px_per_m=options.px_per_m, params=setup.config,
             camera=options.camera, background=options.background, grouping=setup.grouping, seed=setup.seed,
-            name="standard input" if pictures is None else hidden(options.source),
+            mask=options.mask, name="standard input" if pictures is None else hidden(options.source),
         )  # fmt: skip
         self.parts = TrackParts(options.out, fps, self.live.sequence.camera)
         self.latency, self.stored = deque[float](maxlen=LATENCIES), 0
