@@ -232,7 +232,7 @@ RATES = (("cross", 5.0), ("queue", 20.0), ("waiting", 5.0), ("mixed", 5.0))
 SEEDS = (30_000, 30_001)
 
 
-@settings(max_examples=16, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.sampled_from(RATES), st.sampled_from(SEEDS), SIZES, st.integers(20, 90))
 def test_crossings_are_the_same_with_any_number_of_frames_at_once(rate, seed, sizes, every):
     """Motion that the finder does not need is forgotten, and the people of groups that are there no more."""
@@ -252,7 +252,7 @@ def test_crossings_are_the_same_with_any_number_of_frames_at_once(rate, seed, si
     assert repr(sorted(people, key=lambda e: (e.start, e.end, e.before))) == repr(expected)
 
 
-@settings(max_examples=16, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(st.sampled_from(RATES), st.sampled_from(SEEDS), SIZES, st.integers(20, 90))
 def test_queues_are_the_same_with_any_number_of_frames_at_once(rate, seed, sizes, every):
     rows, length, fps = scene(rate[0], seed, rate[1])

@@ -14,7 +14,7 @@ from tracking.grouping.belief import default_belief
 from tracking.grouping.belief_groups import BeliefGroups, StepGrouping
 from tracking.grouping.motion_history import PeopleRows
 from tracking.grouping.pair_beliefs import BeliefHistory, PairBeliefs, StepBeliefs, pair_probabilities
-from tracking.grouping.person_motion import PersonMotion, frames_per_step, step_rows
+from tracking.grouping.person_motion import PersonMotion, StepRows, frames_per_step, step_rows
 from tracking.grouping.tracks_table import TracksTable
 
 
@@ -145,18 +145,47 @@ def test_a_missed_pair_that_was_seen_apart_is_not_together():
     assert (found_groups(*rows, default_belief(), seen)[1][30:] < 0).all()
 
 
-def test_whether_a_removal_is_sure_follows_from_what_was_measured(monkeypatch):
-    """The log-odds of the link's time sum to -5; those that a missed pair keeps are left out."""
-    events, step = np.array([3.0, *[-2.0] * 4, *[5.0] * 4, -9.0]), np.arange(10)
+def links_of(found, seen, steps, monkeypatch):
+    """On and sure of the links of two people in 10 steps, by their beliefs, with so many steps added at once."""
+    motion = PersonMotion(2, 0.4).add(seen.step, seen.column, seen.pos, seen.time)
+    parts = []
+    for low in range(0, 10, steps):
+        end = min(low + steps, 10)
+        now, rows = ((x >= low) & (x < end) for x in (found.step, seen.step))
+        people = StepRows(seen.step[rows], seen.column[rows], seen.pos[rows], seen.time[rows])
+        parts.append(StepBeliefs(low, end, people, motion, found.take(now)))
+    monkeypatch.setattr(BeliefHistory, "add", lambda *_: parts.pop(0))
+    finder, nobody = BeliefGroups(2.5, default_belief()), PeopleRows.none()
+    finder.take_people(np.full(2, -1))
+    links = [finder.add(nobody, nobody.id, 0).links for _ in range(len(parts))]
+    return [row for part in links for row in zip(part.on.tolist(), part.sure.tolist(), strict=True)]
+
+
+at_once = pytest.mark.parametrize("steps", [1, 3, 10])
+
+
+@at_once
+@pytest.mark.parametrize(("begin", "sure"), [(3.0, False), (10.0, True)])
+def test_whether_a_removal_is_sure_follows_from_what_was_measured(begin, sure, steps, monkeypatch):
+    """The log-odds of the link's time sum to -5 or 2; those that a missed pair keeps are left out."""
+    events, step = np.array([begin, *[-2.0] * 4, *[5.0] * 4, -9.0]), np.arange(10)
     missed, none = (step > 4) & (step < 9), np.zeros(10, np.int64)
     found = PairBeliefs(step, none, none + 1, np.column_stack([events, events]), np.zeros(10), missed)
-    rows = side_by_side([1.0] * 10)
-    seen = step_rows(*rows)
-    motion = PersonMotion(2, 0.4).add(seen.step, seen.column, seen.pos, seen.time)
-    monkeypatch.setattr(BeliefHistory, "add", lambda *_: StepBeliefs(0, 10, seen, motion, found))
-    links, _ = found_groups(*rows, default_belief())
-    assert links.on.tolist() == [True, False]
-    assert not links.sure[1]
+    links = links_of(found, step_rows(*side_by_side([1.0] * 10)), steps, monkeypatch)
+    assert [on for on, _ in links] == [True, False]
+    assert links[1][1] == sure
+
+
+@at_once
+@pytest.mark.parametrize("before", [True, False])
+def test_a_link_is_sure_if_people_were_seen_out_of_reach_before(before, steps, monkeypatch):
+    """Beliefs begin in step 5, when the two are within 4 m; the second person is seen from step 0 or 5 on."""
+    step, none = np.arange(5, 10), np.zeros(5, np.int64)
+    found = PairBeliefs(step, none, none + 1, np.full((5, 2), 5.0), np.zeros(5), np.zeros(5, bool))
+    frame, column, pos, length, fps = side_by_side([*[9.0] * 5, *[1.0] * 5])
+    there = (column == 0) | (frame >= 5) | before
+    seen = step_rows(frame[there], column[there], pos[there], length, fps)
+    assert links_of(found, seen, steps, monkeypatch) == [(True, before)]
 
 
 @pytest.mark.parametrize("fps", [2.5, 10.0])

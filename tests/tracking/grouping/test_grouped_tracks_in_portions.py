@@ -151,13 +151,13 @@ def bits(value):
 def cases(draw):
     some = st.sampled_from
     return Case(
-        draw(some(SCENES)), draw(some(range(30_000, 30_002))), draw(st.integers(0, 99)),
+        draw(some(SCENES)), 30_000, draw(st.integers(0, 99)),
         draw(some(("ground", "image", "boxes"))), draw(some(NAMED)), draw(some(("belief", "belief", "rule"))),
         draw(st.booleans()), draw(some((6.0, 20.0, 60.0))), draw(st.floats(0.3, 1.0)),
     )  # fmt: skip
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=24, deadline=None)
 @given(cases(), st.lists(st.one_of(st.integers(1, 9), st.integers(10, 200)), min_size=1, max_size=6))
 def test_any_number_of_frames_at_once_gives_the_same(case, sizes):
     tracks = case.tracks()
@@ -179,7 +179,7 @@ def test_frames_one_by_one_give_the_same(case):
     assert_same(in_portions(case.groups(), tracks, [7]), expected)
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=8, deadline=None)
 @given(cases(), st.floats(0.1, 0.9), st.integers(4, 60))
 def test_groups_that_are_pickled_between_two_frames_go_on(case, share, size):
     tracks = case.tracks()
@@ -311,7 +311,7 @@ def coming_and_going(seconds):
 def test_the_state_does_not_grow_with_time(rule):
     """Every array, list, dict and set of it, over 3,000 s in which people come and go."""
     groups, tracks = GroupsSoFar(FPS, rule=grouping_of(rule)), coming_and_going(3_000.0)
-    most, kinds, size = ({}, {}), Counter(), 50
+    most, kinds, size = ({}, {}), Counter(), 100
     for portion in iter(lambda: list(itertools.islice(tracks, size)), []):
         kinds.update(e.kind for t in groups.add(portion) for e in t.events)
         part = most[0] if groups.end <= 600 * FPS else most[1] if groups.end > 2_400 * FPS else {}
