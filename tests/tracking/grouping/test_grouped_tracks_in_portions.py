@@ -170,7 +170,8 @@ def test_any_number_of_frames_at_once_gives_the_same(case, sizes):
 SOME = (
     Case("mixed", block=6.0, length=0.3, fps=10.0), Case("cross", named="all"),
     Case("merge", named="late", plane="image"),
-    Case("queue", rule="rule"), Case("waiting", plane="boxes", block=6.0), Case("split", named="members"), Case("split", rule="rule"),
+    Case("queue", rule="rule"), Case("waiting", plane="boxes", block=6.0), Case("split", named="members"),
+    Case("split", rule="rule"),
     Case("mixed", named="until", objective=True), Case("queue", named="events", plane="boxes", rule="rule"),
 )  # fmt: skip
 
