@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,17 +21,21 @@ from sim.types import Bools, Ints, Truth
 from tracking.fitting.grouping_scenes import simulated
 from tracking.grouping import grouping_choice
 from tracking.grouping.belief import Belief
-from tracking.grouping.belief_groups import FoundGroups, belief_groups
+from tracking.grouping.belief_groups import BeliefGroups, FoundGroups
 from tracking.grouping.known_people import people_as_tracks
+from tracking.grouping.motion_history import PeopleRows
 from tracking.grouping.pair_beliefs import pair_probabilities
 from tracking.grouping.tracks_table import tabulate
 
 DECIDED = ("SPENCER", "now", "groups of events", "probability above 0.5")
 
 
-def late_groups(*rows: Any, **options: Any) -> FoundGroups:
-    """Returns the groups of events in place of those of now."""
-    return replace(belief_groups(*rows, **options), now=None)
+class LateGroups(BeliefGroups):
+    """The groups of events in place of those of now."""
+
+    def add(self, rows: PeopleRows, column: Ints, end: int) -> FoundGroups:
+        """Adds the frames up to `end`, as `BeliefGroups.add`, and returns the links alone."""
+        return replace(super().add(rows, column, end), now=None)
 
 
 def probable_pairs(truth: Truth, belief: Belief, i: Ints, j: Ints) -> Bools:
@@ -48,7 +51,7 @@ def probable_pairs(truth: Truth, belief: Belief, i: Ints, j: Ints) -> Bools:
 def decision_scores(truth: Truth, belief: Belief) -> list[float]:
     """Returns the pairwise F1 of each decision of `DECIDED`, nan without mates."""
     i, j, same = pairs_in_frames(truth)
-    with replaced_code([(grouping_choice, "belief_groups", late_groups)]):
+    with replaced_code([(grouping_choice, "BeliefGroups", LateGroups)]):
         late = linked_pairs(truth, belief, i, j)
     found = (spencer(truth, i, j), linked_pairs(truth, belief, i, j), late, probable_pairs(truth, belief, i, j))
     once, frame = np.ones((1, truth.length)), truth.frame[i] - 1

@@ -79,6 +79,6 @@ def test_unknown_velocities_become_the_motion_over_half_a_second() -> None:
     assert np.isnan(filled[0].vel).all()
     assert all(t.vel == pytest.approx(np.array([[1.0, 0.0]])) for t in filled[1:])
     known = moving(0.3, 10)
-    assert with_velocities(known, FPS) is known
+    assert all(t is k for t, k in zip(with_velocities(known, FPS), known, strict=True))
     mixed = [*moving(0.3, 6), *moving(np.nan, 10)[6:]]
     assert [float(t.vel[0, 0]) for t in with_velocities(mixed, FPS)] == pytest.approx([0.3] * 6 + [1.0] * 4)

@@ -1,11 +1,18 @@
-from itertools import pairwise
+import functools
+from dataclasses import replace
+from itertools import cycle, pairwise
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
-from sim.truth.crossing_events import crossings, net_crossings
+from scenarios.loading.resolve import load
+from sim.sequence import simulate
+from sim.truth.crossing_events import CrossingFinder, crossings, net_crossings
+from sim.truth.merge_split_rules import frames_of
 from sim.truth.motion_rows import MotionRows
-from sim.truth.queue_detection import queues
+from sim.truth.queue_detection import QueueFinder, queues
 
 FPS = 10.0
 T = np.arange(120)[:, None] / FPS
@@ -189,3 +196,86 @@ def test_net_crossings_are_those_of_the_segments():
     spiral, ray = np.stack([np.cos(round_twice), np.sin(round_twice)], axis=1), np.linspace([0, 0], [3, 0.01], 40)
     assert net_crossings(ray, spiral) == cut(ray, spiral) == -2
     assert net_crossings(ray, 1.1 * spiral[::-1]) == cut(ray, 1.1 * spiral[::-1]) == 2
+
+
+@functools.cache
+def scene(name, seed, fps):
+    """Rows (frame from 0, id, position, velocity, group), frames and fps of a simulated scene."""
+    truth = simulate(load(name, set=[f"camera.fps={fps}"]), seed, streams=()).truth
+    return (truth.frame - 1, truth.id, truth.pos, truth.vel, truth.group), truth.length, truth.fps
+
+
+def portions(length, sizes):
+    """First frame and end of each portion, of as many frames as `sizes` says in turn."""
+    low, sizes = 0, cycle(sizes)
+    while low < length:
+        yield low, (low := min(low + next(sizes), length))
+
+
+class KnownMotion:
+    """The motion of people by id in the frames from `first` to before `end`; all else is not known."""
+
+    def __init__(self, rows, first, end):
+        frame = rows[0]
+        known = (frame >= first) & (frame < end)
+        self.first, self.end = first, end
+        self.rows = MotionRows.of(*(x[known] for x in rows), end)
+
+    def window(self, people, first, end):
+        assert self.first <= first < end <= self.end
+        return self.rows.window(people, first, end)
+
+
+SIZES = st.lists(st.one_of(st.integers(1, 20), st.integers(10, 300)), min_size=1, max_size=5)
+# Name and frames per s: with 20, every other frame is examined for queues.
+RATES = (("cross", 5.0), ("queue", 20.0), ("waiting", 5.0), ("mixed", 5.0))
+SEEDS = (30_000, 30_001)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.sampled_from(RATES), st.sampled_from(SEEDS), SIZES, st.integers(20, 90))
+def test_crossings_are_the_same_with_any_number_of_frames_at_once(rate, seed, sizes, every):
+    """Motion that the finder does not need is forgotten, and the people of groups that are there no more."""
+    rows, length, fps = scene(rate[0], seed, rate[1])
+    expected = crossings(MotionRows.of(*rows, length), fps)
+    finder, found = CrossingFinder(fps), []
+    for low, high in portions(length, sizes):
+        now = (rows[0] >= low) & (rows[0] < high)
+        motion = KnownMotion(rows, finder.first if low else 0, high)
+        events = finder.add(*(rows[k][now] for k in (0, 1, 2, 4)), motion, high)
+        assert all(low < e.end + frames_of(2.0, fps) <= high for e in events)
+        found += events
+        if low // every < high // every:
+            finder.forget({*rows[4][rows[0] == high - 1].tolist()})
+    found += finder.rest(KnownMotion(rows, finder.first, length))
+    people = [replace(e, members=tuple(p + 1 for p in e.members)) for e in found]
+    assert repr(sorted(people, key=lambda e: (e.start, e.end, e.before))) == repr(expected)
+
+
+@settings(max_examples=10, deadline=None)
+@given(st.sampled_from(RATES), st.sampled_from(SEEDS), SIZES, st.integers(20, 90))
+def test_queues_are_the_same_with_any_number_of_frames_at_once(rate, seed, sizes, every):
+    rows, length, fps = scene(rate[0], seed, rate[1])
+    expected = queues(MotionRows.of(*rows, length), fps)
+    finder, found = QueueFinder(fps), []
+    for low, high in portions(length, sizes):
+        now = (rows[0] >= low) & (rows[0] < high)
+        events = finder.add(*(x[now] for x in rows), high)
+        known = [e.end + frames_of(3.0, fps) + frames_of(1.5, fps) for e in events]
+        assert all(low < k <= high for k in known), "people may advance for 3 s, a line may be lost for 1.5 s"
+        found += events
+        if low // every < high // every:
+            finder.forget(high - round(6 * fps))
+    found += finder.rest()
+    people = [replace(e, members=tuple(p + 1 for p in e.members)) for e in found]
+    assert repr(sorted(people, key=lambda e: (e.start, e.end, e.members))) == repr(expected)
+
+
+def test_the_scenes_have_crossings_and_queues():
+    counts = {}
+    for name, rate in RATES:
+        made = [(MotionRows.of(*rows, length), fps) for rows, length, fps in (scene(name, k, rate) for k in SEEDS)]
+        counts[name] = [sum(len(find(*one)) for one in made) for find in (crossings, queues)]
+    assert counts["cross"][0] > 0
+    assert counts["waiting"][0] > 0
+    assert min(counts[name][1] for name in ("queue", "waiting", "mixed")) > 0

@@ -9,6 +9,7 @@ from scenarios.errors import InputError
 from tests import reference_belief as slow
 from tracking.grouping import pair_evidence
 from tracking.grouping.belief import FROZEN, Belief, default_belief
+from tracking.grouping.pair_beliefs import beliefs_of_tracks
 from tracking.grouping.pair_evidence import NAMES, evidence
 from tracking.grouping.person_motion import StepRows
 
@@ -66,9 +67,15 @@ def test_evidence_equals_the_slow_twin(seed, seconds, monkeypatch):
 
 @pytest.mark.parametrize("seed", range(3))
 def test_beliefs_equal_the_slow_twin(seed):
+    """Steps of 4 frames at 10 frames per s; each person is seen in one of them."""
     pos, belief = places(seed), default_belief()
-    time = times(pos, 0.4)
-    found, expected = pair_beliefs(step_rows(pos, time), 0.4, belief), slow.beliefs(pos, time, 0.4, belief)
+    frames = 4 * np.arange(len(pos))[:, None] - np.random.default_rng(0).integers(0, 4, pos.shape[:2])
+    frames[0] = 0
+    step, column = np.nonzero(np.isfinite(pos[..., 0]))
+    rows = frames[step, column], column, pos[step, column]
+    order = np.lexsort(rows[1::-1])
+    every = beliefs_of_tracks(*(x[order] for x in rows), 4 * len(pos) - 3, 10.0, belief)
+    found, expected = every.take(~every.missed), slow.beliefs(pos, frames / 10, 0.4, belief)
     keys = zip(found.step.tolist(), found.a.tolist(), found.b.tolist(), strict=True)
     np.testing.assert_allclose(found.log_odds, [expected[key] for key in keys], atol=1e-9)
     assert len(found.log_odds) == len(expected) > 50

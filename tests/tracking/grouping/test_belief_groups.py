@@ -10,17 +10,37 @@ import pytest
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from tests import reference_belief as slow
-from tracking.grouping import belief_groups as module
 from tracking.grouping.belief import default_belief
-from tracking.grouping.belief_groups import belief_groups, groups_of_steps
-from tracking.grouping.pair_beliefs import PairBeliefs, pair_probabilities
-from tracking.grouping.person_motion import frames_per_step
+from tracking.grouping.belief_groups import BeliefGroups, StepGrouping
+from tracking.grouping.motion_history import PeopleRows
+from tracking.grouping.pair_beliefs import BeliefHistory, PairBeliefs, StepBeliefs, pair_probabilities
+from tracking.grouping.person_motion import PersonMotion, StepRows, frames_per_step, step_rows
 from tracking.grouping.tracks_table import TracksTable
 
 
-def tabled(found):
+def tabled(found, steps, people):
     """The group of each step and person, (S, P), -1 alone."""
-    return found.of(*np.indices(found.shape))
+    out = np.full((steps, people), -1)
+    rows = found.step >= 0  # not of the step before
+    out[found.step[rows], found.person[rows]] = found.group[rows]
+    return out
+
+
+def label_of_steps(shape, *rows_and_numbers):
+    """The groups of all steps at once, (S, P); rows_and_numbers: step, a, b, values, unseen, stay, come, nearest."""
+    grouping = StepGrouping(*rows_and_numbers[4:])
+    grouping.take_people(np.full(shape[1], -1))
+    return tabled(grouping.add(0, shape[0], *rows_and_numbers[:4]), *shape)
+
+
+def found_groups(frame, column, pos, length, fps, belief, seen=None):
+    """The links of all frames at once, and the groups now by step and person, (S, P)."""
+    finder, people = BeliefGroups(fps, belief), int(column.max()) + 1
+    finder.take_people(np.full(people, -1))
+    seen = np.ones(len(frame), bool) if seen is None else seen
+    rows = PeopleRows(frame, column, pos, np.full_like(pos, np.nan), np.full(len(frame), -1), seen)
+    found = finder.add(rows, column, length)
+    return found.links, tabled(found.now, -(-length // frames_per_step(fps)), people)
 
 
 def parts(label):
@@ -40,7 +60,7 @@ def test_groups_of_steps_are_linked_one_join_at_a_time(seed, stay, come, nearest
     kept = (a < b) & (r.random(len(a)) < 0.7)
     step, a, b = step[kept], a[kept], b[kept]
     log_odds = r.normal(0.5, 3, len(a))
-    label = tabled(groups_of_steps((steps, people), step, a, b, log_odds, unseen, stay, come, nearest))
+    label = label_of_steps((steps, people), step, a, b, log_odds, unseen, stay, come, nearest)
     before, differ = set(), 0
     for s in range(steps):
         known = {(i, j): x for q, i, j, x in zip(step, a, b, log_odds, strict=True) if q == s}
@@ -60,13 +80,13 @@ def test_a_chain_of_strangers_is_no_group_and_a_stretched_group_is_one():
     a, b = np.array(pairs).T
     chain, stretched = np.array([1.0, -5, -6, 1, -5, 1]), np.array([4.0, 1, -1, 4, 1, 4])
     for log_odds, size in ((chain, 2), (stretched, 4)):
-        label = tabled(groups_of_steps((1, 4), np.zeros(6, np.int64), a, b, log_odds, -4.0))
+        label = label_of_steps((1, 4), np.zeros(6, np.int64), a, b, log_odds, -4.0)
         assert max(map(len, parts(label[0]))) == size
 
 
 def test_two_pairs_that_are_too_far_apart_for_evidence_are_two_groups():
     step, a, b = [0] * 6 + [1, 1], [0, 0, 0, 1, 1, 2, 0, 2], [1, 2, 3, 2, 3, 3, 1, 3]
-    label = tabled(groups_of_steps((2, 4), *map(np.array, (step, a, b)), np.full(8, 5.0), -4.0, 7.0, 1.2))
+    label = label_of_steps((2, 4), *map(np.array, (step, a, b)), np.full(8, 5.0), -4.0, 7.0, 1.2)
     assert label.tolist() == [[0, 0, 0, 0], [0, 0, 2, 2]]
 
 
@@ -82,7 +102,7 @@ def test_stay_and_come_decide_how_long_links_last(scene):
     rows = (scene.frame - 1, column, scene.pos[:, :2], scene.length, scene.fps)
 
     def changes(**changed):
-        return len(belief_groups(*rows, dataclasses.replace(default_belief(), **changed)).links.frame)
+        return len(found_groups(*rows, dataclasses.replace(default_belief(), **changed))[0].frame)
 
     forgetful, default, late = changes(stay=0.0, come=0.0), changes(), changes(stay=30.0, come=30.0)
     assert forgetful > default > late
@@ -101,11 +121,11 @@ def test_predictions_neither_link_nor_part(together):
     drift = 1 + np.clip((np.arange(60) - 30) / 3, 0, 8)  # the second person is predicted away, or near
     rows = side_by_side(drift if together else 10 - drift)
     seen = (rows[1] == 0) | (rows[0] < 30)
-    held, free = (belief_groups(*rows, default_belief(), some) for some in (seen, None))
-    assert held.links.on.tolist() == [True] * together
-    assert free.links.on.tolist() == [True] + [False] * together
-    assert ((tabled(held.now)[30:] >= 0) == together).all()
-    assert ((tabled(free.now)[-1] >= 0) != together).all()
+    (held, held_now), (free, free_now) = (found_groups(*rows, default_belief(), some) for some in (seen, None))
+    assert held.on.tolist() == [True] * together
+    assert free.on.tolist() == [True] + [False] * together
+    assert ((held_now[30:] >= 0) == together).all()
+    assert ((free_now[-1] >= 0) != together).all()
 
 
 def test_people_who_are_not_measured_in_one_step_form_no_group():
@@ -114,26 +134,58 @@ def test_people_who_are_not_measured_in_one_step_form_no_group():
     reported = (column == 0) | (frame > 20)
     frame, column, pos = frame[reported], column[reported], pos[reported] / 4
     seen = (frame > 20) == (column == 1)
-    held, free = (belief_groups(frame, column, pos, length, 10.0, default_belief(), some) for some in (seen, None))
-    assert not len(held.now.step)
-    assert (tabled(free.now)[-1] == 0).all()
+    held, free = (found_groups(frame, column, pos, length, 10.0, default_belief(), some)[1] for some in (seen, None))
+    assert (held < 0).all()
+    assert (free[-1] == 0).all()
 
 
 def test_a_missed_pair_that_was_seen_apart_is_not_together():
     rows = side_by_side([*[1.0] * 30, *[20.0] * 3, *[20.0] * 10])
     seen = (rows[1] == 0) | (rows[0] < 33)
-    assert (tabled(belief_groups(*rows, default_belief(), seen).now)[30:] < 0).all()
+    assert (found_groups(*rows, default_belief(), seen)[1][30:] < 0).all()
 
 
-def test_whether_a_removal_is_sure_follows_from_what_was_measured(monkeypatch):
-    """The log-odds of the link's time sum to -5; those that a missed pair keeps are left out."""
-    events, step = np.array([3.0, *[-2.0] * 4, *[5.0] * 4, -9.0]), np.arange(10)
+def links_of(found, seen, steps, monkeypatch):
+    """On and sure of the links of two people in 10 steps, by their beliefs, with so many steps added at once."""
+    motion = PersonMotion(2, 0.4).add(seen.step, seen.column, seen.pos, seen.time)
+    parts = []
+    for low in range(0, 10, steps):
+        end = min(low + steps, 10)
+        now, rows = ((x >= low) & (x < end) for x in (found.step, seen.step))
+        people = StepRows(seen.step[rows], seen.column[rows], seen.pos[rows], seen.time[rows])
+        parts.append(StepBeliefs(low, end, people, motion, found.take(now)))
+    monkeypatch.setattr(BeliefHistory, "add", lambda *_: parts.pop(0))
+    finder, nobody = BeliefGroups(2.5, default_belief()), PeopleRows.none()
+    finder.take_people(np.full(2, -1))
+    links = [finder.add(nobody, nobody.id, 0).links for _ in range(len(parts))]
+    return [row for part in links for row in zip(part.on.tolist(), part.sure.tolist(), strict=True)]
+
+
+at_once = pytest.mark.parametrize("steps", [1, 3, 10])
+
+
+@at_once
+@pytest.mark.parametrize(("begin", "sure"), [(3.0, False), (10.0, True)])
+def test_whether_a_removal_is_sure_follows_from_what_was_measured(begin, sure, steps, monkeypatch):
+    """The log-odds of the link's time sum to -5 or 2; those that a missed pair keeps are left out."""
+    events, step = np.array([begin, *[-2.0] * 4, *[5.0] * 4, -9.0]), np.arange(10)
     missed, none = (step > 4) & (step < 9), np.zeros(10, np.int64)
     found = PairBeliefs(step, none, none + 1, np.column_stack([events, events]), np.zeros(10), missed)
-    monkeypatch.setattr(module, "beliefs_of_tracks", lambda *_: found)
-    links = belief_groups(*side_by_side([1.0] * 10), default_belief()).links
-    assert links.on.tolist() == [True, False]
-    assert not links.sure[1]
+    links = links_of(found, step_rows(*side_by_side([1.0] * 10)), steps, monkeypatch)
+    assert [on for on, _ in links] == [True, False]
+    assert links[1][1] == sure
+
+
+@at_once
+@pytest.mark.parametrize("before", [True, False])
+def test_a_link_is_sure_if_people_were_seen_out_of_reach_before(before, steps, monkeypatch):
+    """Beliefs begin in step 5, when the two are within 4 m; the second person is seen from step 0 or 5 on."""
+    step, none = np.arange(5, 10), np.zeros(5, np.int64)
+    found = PairBeliefs(step, none, none + 1, np.full((5, 2), 5.0), np.zeros(5), np.zeros(5, bool))
+    frame, column, pos, length, fps = side_by_side([*[9.0] * 5, *[1.0] * 5])
+    there = (column == 0) | (frame >= 5) | before
+    seen = step_rows(frame[there], column[there], pos[there], length, fps)
+    assert links_of(found, seen, steps, monkeypatch) == [(True, before)]
 
 
 @pytest.mark.parametrize("fps", [2.5, 10.0])
@@ -156,7 +208,7 @@ def test_probabilities_are_those_of_the_groups(fps):
             change = belief.hold if together else -belief.join
             together = k in told and told[k] - 0.4 + change > 0
         expected[k] = together
-    now = belief_groups(frame, column, pos, length, fps, belief, seen).now
-    np.testing.assert_array_equal(tabled(now)[np.arange(length) // size, 0] == 0, expected)
+    now = found_groups(frame, column, pos, length, fps, belief, seen)[1]
+    np.testing.assert_array_equal(now[np.arange(length) // size, 0] == 0, expected)
     assert 0.1 < expected.mean() < 0.9
     assert {*range(40, 50)} <= told.keys(), "where one of the two is predicted, too"

@@ -178,6 +178,16 @@ def test_events_that_the_end_of_a_recording_makes_known_are_counted(length, at_e
     assert events_at_end([], [], FPS) == 0
 
 
+def test_events_of_the_last_frame_are_in_order_of_time_after_the_trackers_own():
+    """A crossing that is known in the last frame, and a queue from the first frame on that is reported as it ends."""
+    still = [paced((12, (0, 0)), start=(60 + 0.8 * k, 0)) for k in range(3)]
+    given = tracks([*passing(), *still])[:78]
+    told = GroupEvent("merge", 78, 78, 78, (-1, -1), (7,), (1, 2), (0.0, 0.0))
+    for own in ((), (told,)):
+        made = derive([*given[:77], given[77].replace(events=own)], FPS)
+        assert [e.kind for e in made[-1].events] == ["merge"] * len(own) + ["queue", "cross"]
+
+
 def test_who_joins_as_they_come_is_no_merge():
     there = np.ones((200, 3), bool)
     there[:60, 2] = False

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracking.grouping.link_rule import LinkRule, find_links
+from tracking.grouping.link_rule import LinkRule, RuleLinks
 
 FPS, LENGTH = 10.0, 100
 
@@ -18,7 +18,9 @@ def test_a_pair_is_linked_and_parted_whatever_others_do(others) -> None:
     rows += [(who, k, 50.0 + 9 * who, 0.0) for who, first, end in others for k in range(first, end)]
     column, frame, x, y = np.array(sorted(rows, key=lambda row: (row[1], row[0]))).T
     pos = np.stack([x, y], axis=1)
-    links = find_links(frame.astype(int), column.astype(int), pos, np.zeros_like(pos), LENGTH, FPS, LinkRule())
+    finder = RuleLinks(FPS, LinkRule())
+    finder.take_people(np.full(int(column.max()) + 1, -1))
+    links = finder.add(frame.astype(int), column.astype(int), pos, np.zeros_like(pos), LENGTH)
     found = list(zip(links.frame.tolist(), links.a.tolist(), links.b.tolist(), links.on.tolist(), strict=True))
     # near in 16 of the 20 frames of the window; apart for 20 frames
     assert found == [(35, 0, 1, True), (79, 0, 1, False)]

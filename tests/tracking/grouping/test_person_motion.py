@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tracking.grouping.person_motion import Motion, PersonMotion, steady_places, step_rows
+from tracking.grouping.person_motion import Motion, PersonMotion, SteadyPlaces, frames_per_step, step_rows
 
 
 def walkers(across: float, along: float, turn: float, fps: float = 2.5, people: int = 8, seconds: float = 30) -> Motion:
@@ -62,6 +62,16 @@ def walk(error: float, people: int = 4, seconds: int = 20, fps: float = 10.0):
     true = np.column_stack([frame / fps, 2.0 * column])
     measured = true + np.random.default_rng(0).normal(0, error, true.shape)
     return frame, column, true, measured, int(seconds * fps), fps
+
+
+def steady_places(frame, column, pos, length, fps):
+    """The steady places of all frames at once, (R, 2)."""
+    people, seen = np.full(int(column.max(initial=-1)) + 1, -1), step_rows(frame, column, pos, length, fps)
+    motion = PersonMotion(len(people), frames_per_step(fps) / fps)
+    noise = motion.add(seen.step, seen.column, seen.pos, seen.time).noise
+    steady = SteadyPlaces(fps)
+    steady.take(people)
+    return steady.add(frame, column, pos, seen, noise)
 
 
 def test_steady_places_are_nearer_the_truth_and_exact_ones_stay():
