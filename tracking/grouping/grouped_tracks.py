@@ -162,6 +162,7 @@ class GroupsSoFar:
         self.rule = rule or default_grouping()
         self.end, self.own, self.same, self.scale, self.added = 0, dict[str, int](), True, 1.0, 0
         self.named: bool | None = None
+        self.begun = False
         self.ids, self.last = np.zeros((2, 0), np.int64)
         self.finder, self.labels = group_finder(self.rule, fps), GroupLabels(fps, self.rule)
         self.steady, self.changes = SteadyPlaces(fps), LabelEvents()
@@ -227,8 +228,8 @@ class GroupsSoFar:
 
     def _as_named(self, t: Tracks) -> Tracks:
         """Returns the tracks of the next frame, without groups that the tracker names later than its first people."""
-        if not self.own and not self.end:
-            self.own = dict.fromkeys(t.own_events, 1)
+        if not self.begun:
+            self.begun, self.own = True, dict.fromkeys(t.own_events, 1)
         for event in t.events:
             self.own.setdefault(event.kind, t.index)
         membership = [frame for kind, frame in self.own.items() if kind in MEMBERSHIP_KINDS]

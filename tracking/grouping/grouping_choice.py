@@ -8,6 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
 from scenarios.loading.toml_files import parse
 from sim.types import Ints
 from tracking.grouping.belief import KIND, Belief, default_belief
@@ -59,7 +61,9 @@ class RuleGroups:
 
     def add(self, rows: PeopleRows, column: Ints, end: int) -> FoundGroups:
         """Adds frames, as `GroupFinder.add`."""
-        return FoundGroups(self.links.add(rows.frame, column, rows.pos, rows.vel, end))
+        there = np.isfinite(rows.pos).all(axis=1)
+        known = rows.frame[there], column[there], rows.pos[there], rows.vel[there]
+        return FoundGroups(self.links.add(*known, end))
 
     def take_people(self, rows: Ints) -> None:
         """Renumbers the people, as `GroupFinder.take_people`."""

@@ -148,7 +148,7 @@ def track(
         run = _completed(running, reported, chosen, run_sensor=sensor or {}, seed=seed, speeds=speeds)
         if mask is None:
             return run
-        return replace(run, info={**run.info, "mask": "an array" if not isinstance(mask, str | Path) else str(mask)})
+        return replace(run, info={**run.info, "mask": "given as an array" if not isinstance(mask, str | Path) else str(mask)})
 
     try:
         for frame in prepared.frames():
