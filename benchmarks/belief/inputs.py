@@ -73,7 +73,7 @@ def _tracked(tracker: str, sequence: LabelledSequence, mode: DetectionMode, seed
     reported = [ready.step(frame) for frame in ready.frames()]
     scale, known = ready.scale(reported), ready.context
     return lambda belief: completed(
-        reported, sequence.fps, scale.px_per_m, belief, camera=known.camera, scene=known.scene, source=ready.input,
+        reported, sequence.fps, scale.px_per_m, belief, camera=known.camera, scene=known.scene,
         image_size=known.image_size,
     )[0]  # fmt: skip
 
@@ -97,7 +97,7 @@ def of_boxes(entry: Entry, seed: int, suite: str, number: int, data: Path) -> It
     def grouped(belief: Belief) -> list[Tracks]:
         found, _ = completed(
             boxes, sequence.fps, sequence.px_per_m, belief, camera=sequence.camera, scene=sequence.scene,
-            source="boxes", image_size=sequence.image_size,
+            image_size=sequence.image_size,
         )  # fmt: skip
         return at_true_places(truth, found)
 

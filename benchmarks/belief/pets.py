@@ -102,7 +102,7 @@ def pair_scores(
     else:
         tracks, _ = completed(
             people, recording.fps, truth.px_per_m, belief, camera=recording.camera, scene=recording.scene,
-            source="pixels" if source == "pixels" else "boxes", image_size=recording.image_size,
+            image_size=recording.image_size,
         )  # fmt: skip
     found = evaluate(truth, tracks, similarity="boxes")
     return float(found["pairwise_precision"]), float(found["pairwise_recall"])

@@ -167,13 +167,13 @@ class Rollout:
         from tracking.running.run import TrackingRun
         from tracking.scoring.people import IncomparableError
 
-        known, source = self.prepared.context, self.prepared.input
+        known = self.prepared.context
         tracks, _ = completed(
             self.tracks, known.fps, self.prepared.px_per_m(self.tracks), camera=known.camera, scene=known.scene,
-            source=source, image_size=known.image_size, objective=not every,
+            image_size=known.image_size, objective=not every,
         )  # fmt: skip
         try:
-            run = TrackingRun(tracks, {"input": source})
+            run = TrackingRun(tracks, {"input": self.prepared.input})
             (compared,) = self.opened.scorer.compare([run], self.similarity, len(run))
             found: Mapping[str, float] = compared.scores("hull") if every else compared.objective_scores()
         except IncomparableError as error:

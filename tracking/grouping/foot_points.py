@@ -2,7 +2,8 @@
 and `completed` derives groups and events there. The ground is that of the camera, or of the boxes (`ground_of_boxes`).
 
 Distances between people are those of the ground, in m, and not px divided by one scale for near and far people. Boxes
-in the image from pixels are never moved, as the foot of a blob is no person's.
+from pixels show the ground as those of detectors do, and groups are derived there; but the tracks themselves stay in
+the image, as the foot of a blob is no person's.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from tracking.grouping.grouped_tracks import GroupsSoFar, groups_in_frames, move
 from tracking.grouping.grouping_choice import Grouping
 from tracking.grouping.tracks_table import TracksTable, tabulate
 
-FEETLESS = ("pixels", "stereo")  # Inputs of trackers whose boxes do not end at people's feet.
+FEETLESS = ("pixels", "stereo")  # Inputs of trackers whose tracks stay in the image.
 
 
 def plane_of_run(tracks: Sequence[Tracks]) -> str | None:
@@ -41,25 +42,24 @@ def source_of(run: Iterable[Tracks] | None) -> str | None:
 
 def can_stand(tracks: Sequence[Tracks], camera: Camera | None, source: str | None = None) -> bool:
     """Returns True if tracks can be moved from the image to the ground: people with boxes, a camera, no pictures.
-    source: as in `completed`."""
-    return camera is not None and boxes_stand(tracks, source)
+    source: what the tracker worked on, an `InputKind`; None: unknown."""
+    return camera is not None and source not in FEETLESS and boxes_stand(tracks)
 
 
-def boxes_stand(tracks: Sequence[Tracks], source: str | None) -> bool:
-    """Returns True if tracks are people in the image whose boxes end at their feet. source: as in `completed`."""
-    return plane_of_run(tracks) == "image" and source not in FEETLESS and boxed(tracks)
+def boxes_stand(tracks: Sequence[Tracks]) -> bool:
+    """Returns True if tracks are people in the image whose boxes end near their feet."""
+    return plane_of_run(tracks) == "image" and boxed(tracks)
 
 
 def ground_below(
-    tracks: Sequence[Tracks], camera: Camera | None, px_per_m: float, source: str | None = None,
-    image_size: tuple[int, int] | None = None,
-) -> Ground:  # fmt: skip
+    tracks: Sequence[Tracks], camera: Camera | None, px_per_m: float, image_size: tuple[int, int] | None = None
+) -> Ground:
     """Returns the ground on which the boxes of tracks stand: by the camera if known, else by the first boxes.
 
-    source: as in `completed`. The boxes are used only if the tracker names no groups. The ground is unknown for tracks
-    that lack boxes, come from pictures, or lie on the ground.
+    The boxes are used only if the tracker names no groups. The ground is unknown for tracks that lack boxes or lie on
+    the ground.
     """
-    if not boxes_stand(tracks, source):
+    if not boxes_stand(tracks):
         return Ground()
     if camera is not None or names_groups(tracks):
         return Ground(camera)
@@ -68,17 +68,16 @@ def ground_below(
 
 def completed(
     tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None = None, *, camera: Camera | None,
-    scene: Scene | None, source: str | None = None, image_size: tuple[int, int] | None = None, objective: bool = False,
+    scene: Scene | None, image_size: tuple[int, int] | None = None, objective: bool = False,
 ) -> tuple[tuple[Tracks, ...], Ground]:  # fmt: skip
     """Returns the tracks with groups and events filled in, and the ground that was used for them.
 
     If the ground under the boxes is known (`ground_below`), groups are derived from positions there, else as
-    `with_groups` does. source: what the tracker worked on, an `InputKind`; None: unknown. image_size: width, height,
-    px; None: unknown. objective: as of `derive`.
+    `with_groups` does. image_size: width, height, px; None: unknown. objective: as of `derive`.
     """
     if all(t.derived for t in tracks):
         return tuple(tracks), Ground()
-    ground = ground_below(tracks, camera, px_per_m, source, image_size)
+    ground = ground_below(tracks, camera, px_per_m, image_size)
     if ground.camera is None:
         return with_groups(tracks, fps, px_per_m, rule, objective=objective), ground
     groups = GroupsSoFar(fps, 1.0, rule, objective=objective, places=partial(places_on, ground, scene))
@@ -87,10 +86,10 @@ def completed(
 
 def people_in_metres(
     tracks: Sequence[Tracks], fps: float, px_per_m: float, *, camera: Camera | None, scene: Scene | None,
-    source: str | None = None, image_size: tuple[int, int] | None = None,
+    image_size: tuple[int, int] | None = None,
 ) -> TracksTable:  # fmt: skip
     """Returns the table of people at the places from which `completed` derives groups; arguments as there."""
-    ground = ground_below(tracks, camera, px_per_m, source, image_size)
+    ground = ground_below(tracks, camera, px_per_m, image_size)
     if ground.camera is None:
         return tabulate(tracks, fps, px_per_m)
     return tabulate(tracks, fps, 1.0, places_on(ground, scene, tracks))
@@ -100,7 +99,9 @@ def places_on(ground: Ground, scene: Scene | None, tracks: Sequence[Tracks]) -> 
     """Returns the points on a known ground (R, 2), m, of all rows of tracks. Boxes that show the ground tell no place
     in the scene."""
     assert ground.camera is not None
-    return standing_points(_boxes(tracks), ground.camera, scene if ground.source == "camera" else None)
+    boxes = [np.full((len(t.id), 4), np.nan) if t.box is None else t.box for t in tracks]
+    box = np.concatenate([np.zeros((0, 4)), *boxes])
+    return standing_points(box, ground.camera, scene if ground.source == "camera" else None)
 
 
 def _boxes(tracks: Sequence[Tracks]) -> Array:

@@ -22,7 +22,7 @@ class Completion:
 
     If the ground under the boxes is known (`ground_below`), groups are derived from positions there. known: the scale
     of tracks in the image; nan: the tracker's own, which `learned` returns, or that of its first boxes. camera, scene,
-    source, image_size: as of `foot_points.completed`.
+    image_size: as of `foot_points.completed`.
 
     State: waiting, the tracks of frames that are not completed yet; scale, ground, that were found; groups, which
     complete the tracks; velocities, which fill in no more than that; both None until ground and scale are known.
@@ -30,11 +30,10 @@ class Completion:
 
     def __init__(
         self, fps: float, known: ImageScale, learned: Callable[[], float], rule: Grouping | None = None, *,
-        camera: Camera | None, scene: Scene | None, source: str | None = None,
-        image_size: tuple[int, int] | None = None,
+        camera: Camera | None, scene: Scene | None, image_size: tuple[int, int] | None = None,
     ) -> None:  # fmt: skip
         self.fps, self.known, self.learned, self.rule = fps, known, learned, rule or default_grouping()
-        self.camera, self.scene, self.source, self.image_size = camera, scene, source, image_size
+        self.camera, self.scene, self.image_size = camera, scene, image_size
         self.waiting, self.scale, self.ground = list[Tracks](), known, Ground()
         self.groups: GroupsSoFar | None = None
         self.velocities: Velocities | None = None
@@ -75,7 +74,7 @@ class Completion:
         if first.unit == "group" or first.plane != "image" or last.t > first.t + LONGEST:
             return True
         known = np.isfinite(self.known.px_per_m) or np.isfinite(self.learned())
-        stands = boxes_stand(self.waiting, self.source)
+        stands = boxes_stand(self.waiting)
         if stands and self.camera is None and not names_groups(self.waiting):
             return self.boxes >= BOXES
         return known or (stands and self.camera is not None) or self.boxes > SCALE_BOXES
@@ -85,7 +84,7 @@ class Completion:
         self.scale = image_scale.from_tracks(self.known, self.learned(), waiting)
         px_per_m = self.scale.px_per_m
         if not any(t.unit == "group" for t in waiting):
-            self.ground = ground_below(waiting, self.camera, px_per_m, self.source, self.image_size)
+            self.ground = ground_below(waiting, self.camera, px_per_m, self.image_size)
         if self.ground.camera is not None:
             places = partial(places_on, self.ground, self.scene)
             self.groups = GroupsSoFar(self.fps, 1.0, self.rule, places=places)

@@ -8,7 +8,7 @@ from scenarios.errors import InputError
 from sim.types import Sequence
 from tracking.grouping.belief import Belief
 from tracking.grouping.explained_pairs import ExplainedPairs, explain
-from tracking.grouping.foot_points import people_in_metres, source_of
+from tracking.grouping.foot_points import people_in_metres
 from tracking.grouping.grouped_tracks import without_groups
 from tracking.grouping.known_people import known_people
 from tracking.grouping.tracks_table import TracksTable
@@ -35,6 +35,6 @@ def people_at_places(sequence: Sequence, run: TrackingRun | None) -> TracksTable
     learned = None if run is None else run.info.get("px_per_m")
     scale = image_scale.from_tracks(image_scale.before_frames(sequence), learned or math.nan, tracks)
     return people_in_metres(
-        tracks, sequence.fps, scale.px_per_m, camera=sequence.camera, scene=sequence.scene, source=source_of(run),
+        tracks, sequence.fps, scale.px_per_m, camera=sequence.camera, scene=sequence.scene,
         image_size=sequence.image_size,
     )  # fmt: skip

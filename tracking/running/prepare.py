@@ -92,7 +92,7 @@ class PreparedTracker:
         """Returns what fills in groups and events of the tracks that `step` returns."""
         known, context = ImageScale(self.context.px_per_m, self.scale_frames), self.context
         return Completion(
-            context.fps, known, self.learned, rule, camera=context.camera, scene=context.scene, source=self.input,
+            context.fps, known, self.learned, rule, camera=context.camera, scene=context.scene,
             image_size=context.image_size,
         )  # fmt: skip
 

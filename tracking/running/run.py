@@ -148,7 +148,8 @@ def track(
         run = _completed(running, reported, chosen, run_sensor=sensor or {}, seed=seed, speeds=speeds)
         if mask is None:
             return run
-        return replace(run, info={**run.info, "mask": "given as an array" if not isinstance(mask, str | Path) else str(mask)})
+        words = str(mask) if isinstance(mask, str | Path) else "given as an array"
+        return replace(run, info={**run.info, "mask": words})
 
     try:
         for frame in prepared.frames():
@@ -216,7 +217,7 @@ def group(
             is unknown or not above 0, or labels or the file of the grouping cannot be read.
         WorkError: A simulated person did not carry out an order of the scenario's script.
     """
-    from tracking.grouping.foot_points import completed, source_of
+    from tracking.grouping.foot_points import completed
     from tracking.grouping.grouped_tracks import events_at_end, without_groups
     from tracking.grouping.known_people import known_people
     from tracking.grouping.plausibility import implausible
@@ -234,7 +235,7 @@ def group(
         raise InputError(file=file, got=got, expected="metres, or a scale", remedy=remedy)
     tracks, ground = completed(
         people, sequence.fps, scale.px_per_m, rule, camera=sequence.camera, scene=sequence.scene,
-        source=source_of(run), image_size=sequence.image_size,
+        image_size=sequence.image_size,
     )  # fmt: skip
     for text in implausible(sequence.name, people, sequence.fps, scale.px_per_m):
         warnings.warn(text, UserWarning, stacklevel=2)
@@ -253,7 +254,7 @@ def group(
 def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...]:
     """Returns stored tracks of a sequence, one `Tracks` per frame, with groups and events derived where they lack. The
     default grouping is used."""
-    from tracking.grouping.foot_points import completed, source_of
+    from tracking.grouping.foot_points import completed
 
     known = image_scale.before_frames(sequence)
     # Labels of all frames tell the scale better than boxes of the first frames.
@@ -261,5 +262,5 @@ def grouped(tracks: SequenceOf[Tracks], sequence: Sequence) -> tuple[Tracks, ...
     px_per_m = known.px_per_m if truth is None else truth.px_per_m
     return completed(
         tracks, sequence.fps, px_per_m, camera=sequence.camera, scene=sequence.scene,
-        source=source_of(tracks), image_size=sequence.image_size,
+        image_size=sequence.image_size,
     )[0]  # fmt: skip

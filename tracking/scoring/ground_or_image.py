@@ -80,7 +80,7 @@ def _in_image(truth: Truth, run: Sequence[Tracks], source: str | None) -> Sequen
     if not (flat or boxed(run)):
         what = "groups without people" if any(t.unit == "group" for t in run) else "people without boxes"
         raise IncomparableError(f"labels or runs in the image (px), and one on the ground (m) with {what}")
-    known = completed(run, truth.fps, truth.px_per_m, camera=truth.camera, scene=truth.scene, source=source)[0]
+    known = completed(run, truth.fps, truth.px_per_m, camera=truth.camera, scene=truth.scene)[0]
     return known if flat else [_track_in_image(t) for t in known]
 
 
