@@ -150,16 +150,15 @@ class Background:
             slow, FLOOR**2,
         )  # fmt: skip
 
-    @property
     def noise(self) -> Floats:
-        """Standard deviation (3,) of the camera's noise, grey levels: the median over the image."""
+        """Returns the standard deviation (3,) of the camera's noise, grey levels: the median over the image."""
         return np.asarray(np.sqrt(np.median(self.var[:, self.valid], axis=1)), np.float32)
 
     def mend(self, where: Bools, colour: Floats) -> None:
         """Replaces the model at the pixels `where` (H, W): mean from `colour` (3, H, W), at gain 1, noise as elsewhere.
         Variance and normalisers were those of something else, so they become the medians over the image."""
         self.mean[:, where] = np.maximum(colour[:, where], 1.0)
-        self.var[:, where] = np.square(self.noise)[:, None]
+        self.var[:, where] = np.square(self.noise())[:, None]
         self.s[where], self.b[where] = np.median(self.s[self.valid]), np.median(self.b[self.valid])
         self.valid[where] = True
 

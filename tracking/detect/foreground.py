@@ -72,7 +72,7 @@ class Foreground:
             sample = np.stack([smoothed(image, self.window) for image in sample])
         self.model = Background(sample, context.fps, settings)
         self.check, self._complete = PictureCheck(), True
-        self.ghosts = Ghosts(self.shape, self.model.noise, context.fps) if settings.adaptive else None
+        self.ghosts = Ghosts(self.shape, self.model.noise(), context.fps) if settings.adaptive else None
         if settings.adaptive:
             self.model.mend(uncovered_in_sample(self.model.mean, self.model.second, self.scale), self.model.second)
 

@@ -7,6 +7,7 @@ foreground than are looked at. A warning follows if OFTEN of at least FEWEST fra
 from __future__ import annotations
 
 import warnings
+from collections.abc import Callable
 
 from tracking.detect.background_kernels import Floats
 
@@ -23,11 +24,11 @@ class PictureCheck:
     def __init__(self) -> None:
         self.frames, self.mostly_foreground, self.too_many, self.said = 0, 0, 0, False
 
-    def add(self, plausible: bool, complete: bool, noise: Floats) -> None:
+    def add(self, plausible: bool, complete: bool, noise: Callable[[], Floats]) -> None:
         """Counts a frame, and warns if it is one too many.
 
-        plausible: False if it is mostly foreground; complete: False if pieces of foreground were left out. noise (3,):
-        standard deviation of each channel, grey levels.
+        plausible: False if it is mostly foreground; complete: False if pieces of foreground were left out. noise:
+        returns the standard deviation (3,) of each channel, grey levels.
         """
         self.frames += 1
         self.mostly_foreground += not plausible
@@ -39,6 +40,6 @@ class PictureCheck:
         what = "are mostly foreground: nothing is measured in them"
         if self.too_many == most:
             what = "have more pieces of foreground than are looked at: the smaller ones are left out"
-        level = float(noise.max())
+        level = float(noise().max())
         cause = LIKE_NOISE.format(level) if level >= NOISY else LIKE_MOTION
         warnings.warn(f"{most} of the first {self.frames} pictures {what}. Cause: {cause}", UserWarning, stacklevel=2)

@@ -18,7 +18,7 @@ def test_usual_pictures_and_a_few_bad_ones_are_not_mentioned() -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for k in range(200):
-            made.add(k % 5 > 0, k % 7 > 0, QUIET)
+            made.add(k % 5 > 0, k % 7 > 0, lambda: QUIET)
 
 
 @pytest.mark.parametrize(
@@ -31,11 +31,11 @@ def test_usual_pictures_and_a_few_bad_ones_are_not_mentioned() -> None:
 def test_bad_pictures_are_mentioned_once_with_their_cause(plausible, complete, noise, words) -> None:
     made = PictureCheck()
     for _ in range(FEWEST - 1):
-        made.add(plausible, complete, noise)
+        made.add(plausible, complete, lambda: noise)
     with pytest.warns(UserWarning, match=words):
-        made.add(plausible, complete, noise)
+        made.add(plausible, complete, lambda: noise)
     for _ in range(3 * FEWEST):  # a second warning would be an error
-        made.add(plausible, complete, noise)
+        made.add(plausible, complete, lambda: noise)
 
 
 def test_of_very_many_regions_the_largest_are_looked_at() -> None:
