@@ -27,7 +27,7 @@ from tracking.grouping.grouped_tracks import (
 from tracking.grouping.grouping_choice import Grouping
 from tracking.grouping.tracks_table import TracksTable, tabulate
 
-FEETLESS = ("pixels", "stereo")  # Inputs of trackers whose boxes do not end at people's feet.
+FEETLESS = ("pixels", "stereo", "pixels and boxes")  # Inputs of trackers whose boxes do not end at people's feet.
 
 
 def plane_of_run(tracks: Sequence[Tracks]) -> str | None:

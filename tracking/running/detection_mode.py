@@ -3,9 +3,10 @@
     image  the tracker's own detector works on the pictures: the frames come without detections
     file   the detections stored with the sequence (det/det.txt)
     truth  the labelled positions or boxes, degraded only by the sensor settings of the command
+    both   the pictures and the boxes stored with the sequence; only if it is asked for
 
-A tracker lists in `needs` what it can work with: pixels, stereo, boxes, points. It works with any one of them, and gets
-no more than it lists: `as_needed`.
+A tracker lists in `needs` what it can work with: pixels, stereo, boxes, points, and "pixels and boxes" if it uses both
+at once. It works with any one of them, and gets no more than it lists: `as_needed`.
 """
 
 from __future__ import annotations
@@ -22,7 +23,8 @@ from sim.scene.standing import standing_points
 from sim.types import DetectionMode, Detections, Frame, Ints, Sequence
 from tracking.running.tracks_check import finite
 
-InputKind = Literal["points", "boxes", "pixels", "stereo"]
+BOTH = "pixels and boxes"
+InputKind = Literal["points", "boxes", "pixels", "stereo", "pixels and boxes"]
 
 
 def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: DetectionMode | None) -> DetectionMode:
@@ -32,6 +34,8 @@ def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: Detection
     requested mode, or for None every mode, is impossible.
     """
     able = [mode for mode in ("image", "file", "truth") if _works(mode, needs, sequence)]
+    if requested == "both" and BOTH in needs and sequence.has_images and sequence.has_detections:
+        return "both"
     if requested in able or (requested is None and able):
         return requested or able[0]  # type: ignore[return-value]
     there = {
@@ -53,9 +57,11 @@ def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
 
 
 def input_kind(needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, frames: Iterable[Frame]) -> InputKind:
-    """Returns what a tracker with these needs works on in this mode: "pixels", "stereo", "boxes" or "points". frames:
-    with the detections that the tracker gets; used only by a tracker that takes boxes and points: of detections in the
-    image it works on the boxes, of others on the points."""
+    """Returns what a tracker with these needs works on in this mode: "pixels", "stereo", "boxes", "points" or "pixels
+    and boxes". frames: with the detections that the tracker gets; used only by a tracker that takes boxes and points:
+    of detections in the image it works on the boxes, of others on the points."""
+    if mode == "both":
+        return "pixels and boxes"
     if mode == "image":
         return "pixels" if "pixels" in needs and sequence.has_images else "stereo"
     if not {"boxes", "points"} <= set(needs):
@@ -76,7 +82,7 @@ class Given:
 def given_detections(
     mode: DetectionMode, sequence: Sequence, sensor: Mapping[str, Any], seed: int, *, owned: bool = False
 ) -> Given:
-    """Returns the detections of the mode "file" or "truth". sensor, seed: degrade and shuffle those of "truth". owned:
+    """Returns the detections of the mode "file", "both" or "truth". sensor, seed: degrade and shuffle those of "truth". owned:
     whether the owners of stored detections are read, too."""
     if mode == "truth":
         from tracking.running.truth_detections import from_truth

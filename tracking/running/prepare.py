@@ -54,7 +54,7 @@ class PreparedTracker:
     context: Context
     mode: DetectionMode
     sequence: Sequence
-    # with detections and without pictures; None: the sequence's own frames (mode "image")
+    # with detections and without pictures; None: the sequence's own frames (mode "image"); "both": these with pictures
     frames_given: tuple[Frame, ...] | None
     given: InputFrames | None = None  # as `frames_given`, and what these were chosen from
     scale_frames: int = 0  # as of ImageScale
@@ -68,9 +68,12 @@ class PreparedTracker:
 
     def frames(self) -> Iterator[Frame]:
         """Returns a new iterator over the frames as the tracker gets them, in order. Each call starts at frame 1."""
-        if self.frames_given is not None:
-            return iter(self.frames_given)
-        return (replace(f, detections=None) for f in self.sequence)
+        if self.frames_given is None:
+            return (replace(f, detections=None) for f in self.sequence)
+        if self.mode == "both":
+            pairs = zip(self.sequence, self.frames_given, strict=True)
+            return (replace(frame, detections=given.detections) for frame, given in pairs)
+        return iter(self.frames_given)
 
     def scale(self, tracks: SequenceOf[Tracks]) -> ImageScale:
         """Returns the image scale for deriving groups from the tracks of frames 1 to now; nan if unknown. It is the
@@ -148,7 +151,7 @@ def input_frames(
     mode: DetectionMode, needs: tuple[str, ...], sequence: Sequence, sensor: Mapping[str, Any], seed: int,
     *, owned: bool = False,
 ) -> InputFrames:  # fmt: skip
-    """Returns the frames with the detections of the mode "file" or "truth", as a tracker with these needs gets them.
+    """Returns the frames with the detections of the mode "file", "both" or "truth", as a tracker with these needs gets them.
     The other arguments are as of `given_detections`."""
     given = given_detections(mode, sequence, sensor, seed, owned=owned)
     seen = as_needed(given, needs, mode, sequence)
@@ -188,7 +191,7 @@ def prepare(
     else:
         given = inputs(mode, instance.needs, seed)
     frames, scale = given.frames, given.scale
-    background = sequence.background() if mode == "image" else None
+    background = sequence.background() if mode in ("image", "both") else None
     context = Context(sequence.fps, scale.px_per_m, sequence.camera, sequence.scene, sequence.image_size, background)
     return PreparedTracker(name, instance, config, context, mode, sequence, frames, given, scale.frames)
 

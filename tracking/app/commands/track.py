@@ -9,6 +9,7 @@ import pickle
 import warnings
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -25,7 +26,7 @@ from tracking.app.stored_tracks import check_place, run_folders
 from tracking.app.tracker_setup import TrackerSetup
 from tracking.config import Config
 from tracking.grouping.grouping_choice import grouping_of
-from tracking.running.detection_mode import choose_mode
+from tracking.running.detection_mode import BOTH, choose_mode
 from tracking.running.run import TrackingRun
 from tracking.running.run_info import input_summary
 from tracking.running.time_limit import TimeLimited
@@ -43,9 +44,13 @@ def track(options: TrackOptions) -> CommandResult:
     from sim.store.atomic import lock_folder
 
     setup = _setup(options)
-    pictures = setup.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(find(setup.tracker).needs)
+    needs = find(setup.tracker).needs
+    seen = {BOTH} if options.boxes is not None else {"pixels", "stereo"}
+    pictures = setup.detections in (None, "image", "both") and not seen.isdisjoint(needs)
     source = source_of(options, options.source, pictures)
     sequences = source.open()
+    if options.boxes is not None and setup.detections is None:
+        setup = replace(setup, detections="both" if pictures and sequences[0].has_images else "file")
     folders = run_folders(sequences, options.source, options.out)
     rows = list[dict[str, Any]]()
     with lock_folder(options.out):
@@ -100,11 +105,10 @@ def _setup(options: TrackOptions) -> TrackerSetup:
     rule = None if options.grouping is None else grouping_of(options.grouping)
     config = _config(options.tracker, options.params, own)
     limited = None if options.step_timeout is None else TimeLimited(options.tracker, options.step_timeout)
-    detections = options.detections or (None if options.boxes is None else "file")
-    if options.boxes is not None and detections != "file":
-        got, remedy = f"--detections {detections}", "leave --boxes or --detections out"
-        raise InputError(place="--boxes", got=got, expected="--detections file", remedy=remedy)
-    return TrackerSetup(options.tracker, config, detections, sensor, options.seed, rule, limited)
+    if options.boxes is not None and options.detections not in (None, "file", "both"):
+        got, remedy = f"--detections {options.detections}", "leave --boxes or --detections out"
+        raise InputError(place="--boxes", got=got, expected="--detections file or both", remedy=remedy)
+    return TrackerSetup(options.tracker, config, options.detections, sensor, options.seed, rule, limited)
 
 
 def _config(tracker: str, params: str | None, settings: list[str]) -> Config | None:
@@ -120,7 +124,7 @@ def _config(tracker: str, params: str | None, settings: list[str]) -> Config | N
 
 def _check_modes(setup: TrackerSetup, sequences: list[Sequence], background: str | None) -> None:
     modes = [choose_mode(find(setup.tracker).needs, sequence, setup.detections) for sequence in sequences]
-    if background is not None and "image" not in modes:
+    if background is not None and {"image", "both"}.isdisjoint(modes):
         got, expected = f"--detections {modes[0]}", "a tracker that works on pictures"
         raise InputError(place="--background", got=got, expected=expected, remedy="leave --background out")
     if setup.tracker == "stereo" and modes[0] != "image":

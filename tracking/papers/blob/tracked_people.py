@@ -125,7 +125,12 @@ class TrackedPeople:
         if not self.by_existence:
             self.rho = self.compute_rho()
         self.states[:] = self.transition @ self.states
-        self.detect_prob = observed * self.config.detect_prob
+        self.expect(observed * self.config.detect_prob)
+
+    def expect(self, detect_prob: float) -> None:
+        """Computes the probability that each track is measured, where a person who can be detected and whom nobody
+        hides is detected with the probability `detect_prob`."""
+        self.detect_prob = detect_prob
         boxes, var = self.upright_boxes(), self.bank[kalman.VAR]
         shown = 1.0 if self.top else kernels.visible_shares(boxes, self.scale, self.existence(), var)
         self.detectable = self.detect_prob * shown * np.ones(len(self.id))
@@ -225,18 +230,18 @@ class TrackedPeople:
         size = np.maximum(place[:, 2], place[:, 3]) / PERSON_HEIGHT
         return np.asarray(np.minimum(np.maximum(size, whole / LARGEST_SCALE), whole * LARGEST_SCALE))
 
-    def new_people(self, z: Array, free: Bools, ratio: Array | float = 1.0) -> Array:
+    def new_people(self, z: Array, free: Bools, ratio: Array | float = 1.0, *, last: bool = True) -> Array:
         """Returns the probability (M,) that each box z (M, 4), as no track's, is of a person without a track.
 
         It may also be false, or a second box of a measured person or of an earlier one of the boxes `free` (M,), which
-        no track has. Also counts the people without a track.
+        no track has. last: also counts the people without a track, which must be done once a frame.
         """
         c, new, double = self.config, self._new_people() * (ratio * np.ones(len(z))), np.zeros(len(z))
         person = new / (new + c.clutter_rate)
         kernels.add_doubles(double, z, self.bank[kalman.PLACE], self.scale, self.existence() * self.measured, False)
         kernels.add_doubles(double, z, z, self._scale_of(z), person * free, True)
         double *= c.clutter_rate * DOUBLES / (2 * np.pi * kernels.DOUBLE_SPREAD**2) ** 2 / self.false_density
-        if len(z) or len(self.id):
+        if last and (len(z) or len(self.id)):
             stay = np.exp(-self.dynamics.dt / existence.LIFETIME)
             self.unseen_time = stay * (1 - self.detect_prob) * self.unseen_time + self.dynamics.dt
         return np.asarray(new / (new + c.clutter_rate + double))

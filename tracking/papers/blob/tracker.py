@@ -30,7 +30,7 @@ class Blob:
     All but config exist after `reset` only.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ("pixels", "boxes")
+    needs: ClassVar[tuple[str, ...]] = ("pixels", "boxes", "pixels and boxes")
     config_class: ClassVar[type[BlobConfig]] = BlobConfig
 
     def __init__(self, config: BlobConfig | None = None) -> None:

@@ -32,6 +32,7 @@ from tracking.detect.person_size import KEPT, PersonSize, upright
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry, person_look_kernels, person_template, person_template_search_kernels
 from tracking.papers.blob import person_template_kernels as kernels
+from tracking.papers.blob.box_evidence import BoxEvidence
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.ellipse_tracks import TrackedEllipses
 from tracking.papers.blob.person_look_kernels import LEARN_SHOWN, LOOK_TIME
@@ -91,6 +92,7 @@ class PixelUpdater:
         self.size, self.learn_at = PersonSize(context), 0.0
         self.foreground = Foreground(context, config)
         self.foreground.learn_person_size(self.size, context.background)
+        self.boxes = BoxEvidence(people, self.size)
         self.upright_var = np.inf if self.size.above else np.radians(UPRIGHT) ** 2
         self.follow(config)
 
@@ -105,20 +107,26 @@ class PixelUpdater:
         self.confirm_gates = chdtri(np.array([4, 5]), 1 - CONFIRM_GATE)
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
-        """Updates the tracks with a frame's picture (H, W, 3) BGR uint8; `detections` are not used."""
+        """Updates the tracks with a frame's picture (H, W, 3) BGR uint8 and with its boxes; each may be missing."""
         people, foreground = self.people, self.foreground
         people.px_per_m = foreground.scale
         seen = None if frame.image is None else foreground.segment(frame.image)
-        people.predict(observed=seen is not None and seen.plausible)
+        looked = seen is not None and seen.plausible
+        people.predict(observed=looked)
         people.widen_view(np.zeros((0, 4)))
+        boxed = np.zeros(0, np.int64)
+        if detections is not None:
+            boxed = self.boxes.measure(frame.t, detections, frame.image, self.gates[0])
+            people.expect(looked * self.config.detect_prob)
         if seen is None or not seen.plausible:
             if seen is not None:
                 foreground.adapt(seen, self._protected())
             people.record_measured(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0), np.zeros(0))
+            people.measured[boxed] = True
             people.delete_tracks(frame.t)
             return
         found = foreground.person_blobs(seen.mask)
-        self._measure(frame.t, seen, found)
+        self._measure(frame.t, seen, found, boxed)
         foreground.adapt(seen, self._protected())
         if len(found) and (frame.t >= self.learn_at or len(self.size.lone) < KEPT):
             self.learn_at = frame.t + SIZE_TIME
@@ -134,7 +142,7 @@ class PixelUpdater:
         height, width, px."""
         return self._person_boxes(self.people.upright_boxes()[rows])
 
-    def _measure(self, t: float, seen: Segmented, found: Blobs) -> None:
+    def _measure(self, t: float, seen: Segmented, found: Blobs, boxed: Ints) -> None:
         people = self.people
         expected = people.upright_boxes()
         split = self.config.split and self.size.reliable
@@ -163,6 +171,7 @@ class PixelUpdater:
             self._learn_looks(seen.image, made.rows)
         near = away <= self.confirm_gates[kalman.directed(made.angle_var).astype(int)]
         people.record_measured(made.rows, near, made.support, evidence)
+        people.measured[boxed] = True
         person = people.new_people(unexplained[:, :4].copy(), np.ones(len(unexplained), bool))
         people.delete_tracks(t)
         people.start_tracks(unexplained, np.ones(len(unexplained)), t, person)
