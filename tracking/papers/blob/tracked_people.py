@@ -149,23 +149,29 @@ class TrackedPeople:
         """Returns the existence probability (N,) of all tracks."""
         return np.asarray(self.states[existence.SHOWN] + self.states[existence.HIDDEN])
 
-    def innovations(self, z: Array) -> tuple[Array, Array]:
-        """Returns d^2 (N, M) (eq. 9), and ln |2 pi S| (N,), in m, of N tracks and M boxes z (M, 4)."""
-        return kalman_kernels.distances(self.bank[kalman.PLACE], self.bank[kalman.VAR] + self.noise, z, self.scale)
+    def innovations(self, z: Array, noise: Array | None = None) -> tuple[Array, Array]:
+        """Returns d^2 (N, M) (eq. 9), and ln |2 pi S| (N,), in m, of N tracks and M boxes z (M, 4). noise (4,): variances
+        of the boxes, m^2; None: the config's."""
+        S = self.bank[kalman.VAR] + (self.noise if noise is None else noise)
+        return kalman_kernels.distances(self.bank[kalman.PLACE], S, z, self.scale)
 
     def evidence(self, rows: Ints, d2: Array, log_det: Array) -> Array:
         """Returns ln N(z; z_pred, S) over the density of false boxes, of P pairs of tracks `rows` and boxes, from d^2
         and ln |2 pi S|; all (P,)."""
         return np.asarray(-0.5 * (d2 + log_det) - np.log(self.false_density * np.square(self.scale[rows])))
 
-    def associate(self, rows: Ints, columns: Ints, d2: Array, evidence: Array, ratio: Array | float = 1.0) -> Ints:
+    def associate(
+        self, rows: Ints, columns: Ints, d2: Array, evidence: Array, ratio: Array | float = 1.0,
+        states: Array | None = None,
+    ) -> Ints:  # fmt: skip
         """Returns the indices (K,) of the associated pairs, one to one, of P pairs of tracks `rows` and measurements
-        `columns`, row by row. d2, evidence (P,): of `innovations` and `evidence`; ratio (P,): of the score."""
+        `columns`, row by row. d2, evidence (P,): of `innovations` and `evidence`; ratio (P,): of the score;
+        states (3, N): None takes those of the tracks."""
         if not self.by_existence:
             best = assignment.cheapest(columns, d2, rows)
             return best[assignment.cheapest(rows[best], d2[best], columns[best])]
         new, ratio = self._new_people() / self.config.clutter_rate, ratio * np.ones(len(rows))
-        cost = kernels.pair_costs(rows, evidence, ratio, new, self.detectable, self.states)
+        cost = kernels.pair_costs(rows, evidence, ratio, new, self.detectable, self.states if states is None else states)
         likely = np.flatnonzero(cost < 0)
         return likely[assignment.one_to_one(rows[likely], columns[likely], cost[likely])]
 

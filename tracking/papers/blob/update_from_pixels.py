@@ -140,7 +140,8 @@ class PixelUpdater:
     def reported_boxes(self, rows: Ints) -> Array:
         """Returns the boxes (K, 4) that the tracker reports for the tracks at positions `rows` (K,): centre x, y,
         height, width, px."""
-        return self._person_boxes(self.people.upright_boxes()[rows])
+        boxes = self._person_boxes(self.people.upright_boxes()[rows])
+        return np.concatenate([boxes[:, :2], boxes[:, 2:] * np.sqrt(self.boxes.over_person)], 1)
 
     def _measure(self, t: float, seen: Segmented, found: Blobs, boxed: Ints) -> None:
         people = self.people
@@ -150,6 +151,7 @@ class PixelUpdater:
         columns = lone.nonzero()[0]
         z, angle_var = found.ellipse[columns], found.angle_var[columns] + ANGLE_NOISE
         made, taken, gated = self._associate(z, angle_var)
+        self.boxes.learn(made.rows, self._person_boxes(upright(made.z[:, :4], made.z[:, 4])))
         unexplained = np.delete(z, taken if split else gated, 0)
         if split:
             cover = np.zeros(seen.mask.shape, np.int16)
