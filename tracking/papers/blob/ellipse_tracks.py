@@ -35,7 +35,14 @@ class TrackedEllipses(TrackedPeople):
     direction's variance in a frame. In `bank` the coordinates are x, y, h, w: centre and full axes of the ellipse.
     """
 
-    columns: ClassVar[dict[str, int]] = {**TrackedPeople.columns, "angle": 1, "nominal": 1, "look": 0, "detector": 0, "lasting": 0}
+    columns: ClassVar[dict[str, int]] = {
+        **TrackedPeople.columns,
+        "angle": 1,
+        "nominal": 1,
+        "look": 0,
+        "detector": 0,
+        "lasting": 0,
+    }
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
         self.detector, self.lasting = np.zeros((2, 0))

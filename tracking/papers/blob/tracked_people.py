@@ -171,7 +171,9 @@ class TrackedPeople:
             best = assignment.cheapest(columns, d2, rows)
             return best[assignment.cheapest(rows[best], d2[best], columns[best])]
         new, ratio = self._new_people() / self.config.clutter_rate, ratio * np.ones(len(rows))
-        cost = kernels.pair_costs(rows, evidence, ratio, new, self.detectable, self.states if states is None else states)
+        cost = kernels.pair_costs(
+            rows, evidence, ratio, new, self.detectable, self.states if states is None else states
+        )
         likely = np.flatnonzero(cost < 0)
         return likely[assignment.one_to_one(rows[likely], columns[likely], cost[likely])]
 
@@ -186,7 +188,7 @@ class TrackedPeople:
         self.measured[:] = False
         self.measured[rows] = True
         self.score[rows] = score
-        self.scale[:] = self._scale_of(self.bank[kalman.PLACE])
+        self.scale[:] = self.scale_of(self.bank[kalman.PLACE])
         if self.by_existence:
             existence.update(self.states, rows, self.detectable, np.exp(evidence), ratio)
             self.confirmed[:] = self.existence() >= kernels.LIKELY
@@ -229,7 +231,8 @@ class TrackedPeople:
         self.stand_cov[new] = np.diag([PLACE_SPREAD**2, PLACE_SPREAD**2, speed, speed, HEIGHT_SPREAD**2])
         self.measure_on_ground(new, box[new], self.noise)
 
-    def _scale_of(self, place: Array) -> Array:
+    def scale_of(self, place: Array) -> Array:
+        """Returns the scale (M,), px per m, of people with the boxes `place` (M, 4): centre x, y, height, width, px."""
         whole = self.px_per_m
         if self.top:
             return np.full(len(place), whole)
@@ -245,7 +248,7 @@ class TrackedPeople:
         c, new, double = self.config, self._new_people() * (ratio * np.ones(len(z))), np.zeros(len(z))
         person = new / (new + c.clutter_rate)
         kernels.add_doubles(double, z, self.bank[kalman.PLACE], self.scale, self.existence() * self.measured, False)
-        kernels.add_doubles(double, z, z, self._scale_of(z), person * free, True)
+        kernels.add_doubles(double, z, z, self.scale_of(z), person * free, True)
         double *= c.clutter_rate * DOUBLES / (2 * np.pi * kernels.DOUBLE_SPREAD**2) ** 2 / self.false_density
         if last and (len(z) or len(self.id)):
             stay = np.exp(-self.dynamics.dt / existence.LIFETIME)
@@ -279,7 +282,7 @@ class TrackedPeople:
             return
         self._append(
             bank=kalman.born(z[:, :4], self.noise, self.dynamics.birth_rate_var),
-            id=np.arange(self.next_id, self.next_id + n), scale=self._scale_of(z), born=np.full(n, t), score=score,
+            id=np.arange(self.next_id, self.next_id + n), scale=self.scale_of(z), born=np.full(n, t), score=score,
             states=existence.newborn(person),
             confirmed=self.by_existence & (person >= kernels.LIKELY), measured=np.ones(n, bool),
         )  # fmt: skip

@@ -102,6 +102,7 @@ class PixelUpdater:
 
         self.config = config
         self.foreground.follow(config)
+        self.boxes.calibrate()
         # largest d^2 at these shares, for 4 degrees of freedom (no direction) and 5 (eq. 10)
         self.gates = chdtri(np.array([4, 5]), 1 - config.gate)
         self.confirm_gates = chdtri(np.array([4, 5]), 1 - CONFIRM_GATE)
