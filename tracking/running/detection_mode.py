@@ -82,8 +82,8 @@ class Given:
 def given_detections(
     mode: DetectionMode, sequence: Sequence, sensor: Mapping[str, Any], seed: int, *, owned: bool = False
 ) -> Given:
-    """Returns the detections of the mode "file", "both" or "truth". sensor, seed: degrade and shuffle those of "truth". owned:
-    whether the owners of stored detections are read, too."""
+    """Returns the detections of the mode "file", "both" or "truth". sensor, seed: degrade and shuffle those of "truth".
+    owned: whether the owners of stored detections are read, too."""
     if mode == "truth":
         from tracking.running.truth_detections import from_truth
 

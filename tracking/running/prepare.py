@@ -151,8 +151,8 @@ def input_frames(
     mode: DetectionMode, needs: tuple[str, ...], sequence: Sequence, sensor: Mapping[str, Any], seed: int,
     *, owned: bool = False,
 ) -> InputFrames:  # fmt: skip
-    """Returns the frames with the detections of the mode "file", "both" or "truth", as a tracker with these needs gets them.
-    The other arguments are as of `given_detections`."""
+    """Returns the frames with the detections of the mode "file", "both" or "truth", as a tracker with these needs gets
+    them. The other arguments are as of `given_detections`."""
     given = given_detections(mode, sequence, sensor, seed, owned=owned)
     seen = as_needed(given, needs, mode, sequence)
     scale = image_scale.of_sequence(sequence, given)

@@ -150,8 +150,8 @@ class TrackedPeople:
         return np.asarray(self.states[existence.SHOWN] + self.states[existence.HIDDEN])
 
     def innovations(self, z: Array, noise: Array | None = None) -> tuple[Array, Array]:
-        """Returns d^2 (N, M) (eq. 9), and ln |2 pi S| (N,), in m, of N tracks and M boxes z (M, 4). noise (4,): variances
-        of the boxes, m^2; None: the config's."""
+        """Returns d^2 (N, M) (eq. 9), and ln |2 pi S| (N,), in m, of N tracks and M boxes z (M, 4). noise (4,):
+        variances of the boxes, m^2; None: the config's."""
         S = self.bank[kalman.VAR] + (self.noise if noise is None else noise)
         return kalman_kernels.distances(self.bank[kalman.PLACE], S, z, self.scale)
 
@@ -288,6 +288,8 @@ class TrackedPeople:
         )  # fmt: skip
         if self.context.camera is not None:
             self._append(stand=np.full((n, 5), np.nan), stand_cov=np.full((n, 5, 5), np.nan))
+        if not self.by_existence:
+            self.rho = np.append(self.rho, np.full(n, self.birth_rho))
         self.next_id += n
 
     def _append(self, **new: Array | Ints | Bools) -> None:

@@ -2,6 +2,7 @@
 
 Order of a frame, with the paper's sections:
     predict all tracks                                                        sec. 4.2, eqs 1, 2
+    if a detector's boxes are given, too: associate, update, start tracks     ours (box_evidence)
     classify, clean, find blobs                                               secs. 3.2, 3.3 (detect.foreground)
     blobs of one person's size (without `split` all): gate, associate         secs. 4.3, 4.4, eqs 8 to 10
     other foreground: split among the tracks expected there, by templates     ours (person_template)
@@ -78,7 +79,7 @@ class PixelUpdater:
     State: foreground, the pipeline with its background model; size, the size of a person at each place. It learns from
     every picture until KEPT people are remembered, then from the first one at or after `learn_at`, s. people, the table
     of tracks; config; gates, confirm_gates (2,): largest squared Mahalanobis distance d^2, without and with direction,
-    of an association and of a measurement that may confirm a track; upright_var: variance of the direction of an
+    of an association and of a measurement that may confirm a track; boxes, the evidence of a detector; upright_var: variance of the direction of an
     upright template, rad^2, inf from straight above.
     """
 
@@ -117,7 +118,7 @@ class PixelUpdater:
         people.widen_view(np.zeros((0, 4)))
         boxed = np.zeros(0, np.int64)
         if detections is not None:
-            boxed = self.boxes.measure(frame.t, detections, frame.image, self.gates[0])
+            boxed = self.boxes.measure(frame.t, detections, frame.image if looked else None, self.gates[0])
             people.expect(looked * self.config.detect_prob)
         if seen is None or not seen.plausible:
             if seen is not None:
