@@ -151,22 +151,23 @@ def poster(frames: list[Frame], k: int, size: tuple[int, int]) -> Array:
 
 
 def merged(frames: list[Frame], k: int, size: tuple[int, int]) -> Array:
-    found: list[Array] = []
-    for box in boxes_of(frames[k]):
-        for other in range(len(found)):
-            low, high = (
-                np.minimum(box[:2], found[other][:2]),
-                np.maximum(box[:2] + box[2:], found[other][:2] + found[other][2:]),
-            )
-            inner = np.minimum(box[:2] + box[2:], found[other][:2] + found[other][2:]) - np.maximum(
-                box[:2], found[other][:2]
-            )
-            if inner.min() > 0 and inner.prod() >= MERGED * min(box[2:].prod(), found[other][2:].prod()):
-                found[other] = np.concatenate([low, high - low])
-                break
-        else:
+    found: list[Array] = []  # left, top, right, lower edge
+    for left, top, wide, high in boxes_of(frames[k]):
+        box = np.array([left, top, left + wide, top + high])
+        near = next((j for j, other in enumerate(found) if shared_area(box, other) >= MERGED), None)
+        if near is None:
             found.append(box)
-    return np.reshape(found, (-1, 4))
+        else:
+            both = np.stack([box, found[near]])
+            found[near] = np.concatenate([both[:, :2].min(0), both[:, 2:].max(0)])
+    box = np.reshape(found, (-1, 4))
+    return np.concatenate([box[:, :2], box[:, 2:] - box[:, :2]], 1)
+
+
+def shared_area(one: Array, other: Array) -> float:
+    """Returns the area that two boxes (4,) left, top, right, lower edge share, over that of the smaller one."""
+    side = np.maximum(np.minimum(one[2:], other[2:]) - np.maximum(one[:2], other[:2]), 0.0)
+    return float(side.prod() / min((one[2:] - one[:2]).prod(), (other[2:] - other[:2]).prod()))
 
 
 def half_rate(frames: list[Frame], k: int, size: tuple[int, int]) -> Array:

@@ -21,6 +21,7 @@ DEFAULT_MODES = [
     (("pixels", "boxes"), {"has_detections": True}, "file"),
     (("stereo", "points"), {"has_images": True, "load_truth": lambda: None}, "truth"),
     (("stereo",), {"has_images": True, "has_right": True}, "image"),
+    (("pixels and boxes",), {"has_images": True, "has_detections": True}, "both"),
 ]
 
 
@@ -32,7 +33,7 @@ def test_default_mode(needs, has, expected):
 USES_BOTH = ("pixels", "boxes", "pixels and boxes")
 
 
-def test_both_are_given_only_if_asked_for():
+def test_a_tracker_that_can_do_without_gets_both_only_if_asked_for():
     sequence = source(has_images=True, has_detections=True)
     assert choose_mode(USES_BOTH, sequence, None) == "image"
     assert choose_mode(USES_BOTH, sequence, "both") == "both"

@@ -26,8 +26,8 @@ class Blob:
     """The tracker `blob`: people tracked from pixels if the context has a background sample, and from boxes.
 
     Made from a BlobConfig; None: the defaults. State: config, a BlobConfig, which may be replaced between two frames;
-    people, the table of tracks; updater, which updates the table from boxes, or from pixels and boxes; context, of the sequence.
-    All but config exist after `reset` only.
+    people, the table of tracks; updater, which updates the table from boxes, or from pixels and boxes; context, of the
+    sequence. All but config exist after `reset` only.
     """
 
     needs: ClassVar[tuple[str, ...]] = ("pixels", "boxes", "pixels and boxes")
@@ -65,9 +65,9 @@ class Blob:
         """Returns the tracks to report after a frame, unit "person", each `group` -1; updates all tracks.
 
         They are boxes in the image (plane "image", px). With a camera they are on the ground (plane "ground", m) with
-        boxes, and a track above the horizon is left out. detections: None is a frame at which no
-        detector looked. A frame without image, or with too much foreground, has no measurement from pixels. If `config` was replaced
-        since the last frame, all tracks go on with the new one.
+        boxes, and a track above the horizon is left out. detections: None is a frame at which no detector looked. A
+        frame without image, or with too much foreground, has no measurement from pixels. If `config` was replaced since
+        the last frame, all tracks go on with the new one.
 
         Raises InputError if the picture's size or dtype is not the background sample's, or if there are boxes and the
         scale px_per_m is unknown, zero or negative.

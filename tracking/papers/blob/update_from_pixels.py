@@ -79,8 +79,8 @@ class PixelUpdater:
     State: foreground, the pipeline with its background model; size, the size of a person at each place. It learns from
     every picture until KEPT people are remembered, then from the first one at or after `learn_at`, s. people, the table
     of tracks; config; gates, confirm_gates (2,): largest squared Mahalanobis distance d^2, without and with direction,
-    of an association and of a measurement that may confirm a track; boxes, the evidence of a detector; upright_var: variance of the direction of an
-    upright template, rad^2, inf from straight above.
+    of an association and of a measurement that may confirm a track; boxes, the evidence of a detector; upright_var:
+    variance of the direction of an upright template, rad^2, inf from straight above.
     """
 
     def __init__(self, config: BlobConfig, people: TrackedEllipses, context: Context) -> None:
