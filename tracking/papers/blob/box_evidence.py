@@ -29,7 +29,7 @@ from tracking.papers.blob.tracked_people import LEAST_EXISTENCE, SIZE_SPREAD
 from tracking.papers.blob.tracked_people_kernels import LIKELY
 from tracking.papers.blob.update_from_boxes import measured_boxes
 
-BOX_NOISE = 3.0  # variance of a box over the config's: errors of a detector last, so that boxes are not independent
+BOX_NOISE = 2.0  # variance of a box over the config's: errors of a detector last, so that boxes are not independent
 SHARED_BOX = 0.1  # probability that two people whose boxes touch have one box together
 BLIND_SHARE = 0.05  # share of frames in which a detector does not look, before it has looked
 PERSON_SPREAD = 0.15  # m: standard deviation of people's sizes about the size expected at their place
