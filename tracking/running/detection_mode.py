@@ -98,7 +98,8 @@ def as_needed(given: Given, needs: tuple[str, ...], mode: DetectionMode, sequenc
 
     Without "boxes" and "pixels and boxes" among the needs they have no boxes. Without "points" their positions follow
     from their boxes. With a camera that is where the bodies with the boxes stand on the ground; a box whose foot shows
-    no ground is left out. Without a camera it is the middle of the box. Raises InputError if the needs lack "points" and there are no boxes.
+    no ground is left out. Without a camera it is the middle of the box. Raises InputError if the needs lack "points"
+    and there are no boxes.
     """
     if {"boxes", BOTH}.isdisjoint(needs):
         return Given([None if d is None else d.replace(box=None) for d in given.detections], given.owners)
