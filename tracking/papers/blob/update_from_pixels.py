@@ -153,7 +153,8 @@ class PixelUpdater:
         columns = lone.nonzero()[0]
         z, angle_var = found.ellipse[columns], found.angle_var[columns] + ANGLE_NOISE
         made, taken, gated = self._associate(z, angle_var)
-        self.boxes.learn(made.rows, self._person_boxes(upright(made.z[:, :4], made.z[:, 4])))
+        if len(boxed):
+            self.boxes.learn(made.rows, self._person_boxes(upright(made.z[:, :4], made.z[:, 4])))
         unexplained = np.delete(z, taken if split else gated, 0)
         if split:
             cover = np.zeros(seen.mask.shape, np.int16)
