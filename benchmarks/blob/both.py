@@ -44,7 +44,6 @@ WITHOUT: dict[str, Sequence[Replacement]] = {
     "any size starts tracks": [(box_evidence.BoxEvidence, "size_ratios", lambda self, box: np.ones(len(box)))],
     "offset and size of boxes not learned": [(box_evidence.BoxEvidence, "learn", lambda *_: None)],
     "false boxes do not last": [(existence, "LASTING", 0.0)],
-    "the detector always looks": [(box_evidence, "BLIND_SHARE", 0.0)],
 }
 
 

@@ -31,7 +31,6 @@ from tracking.papers.blob.update_from_boxes import measured_boxes
 
 BOX_NOISE = 2.0  # variance of a box over the config's: errors of a detector last, so that boxes are not independent
 SHARED_BOX = 0.1  # probability that two people whose boxes touch have one box together
-BLIND_SHARE = 0.05  # share of frames in which a detector does not look, before it has looked
 PERSON_SPREAD = 0.15  # m: standard deviation of people's sizes about the size expected at their place
 NORMAL_MEDIAN = 0.4549  # median of the square of a standard normal variable
 
@@ -60,7 +59,7 @@ class BoxEvidence:
         people = self.people
         raw, score = measured_boxes(detections)
         box = self.as_seen(raw)
-        self._expect(len(box))
+        people.expect(people.config.detect_prob)
         z = box_geometry.inscribed_ellipses(np.concatenate([box[:, :2], box[:, 2:] / self.size.box_over_ellipse], 1))
         ratio, free = self.scores.ratios(score), np.ones(len(z), bool)
         rows, columns, evidence = self._associate(box, z, ratio, free, image, gate)
@@ -108,14 +107,6 @@ class BoxEvidence:
         """Returns the boxes (M, 4) that the people in a detector's boxes (M, 4), px, have in the picture."""
         place = box[:, :2] - self.offset * self.people.scale_of(box)[:, None]
         return np.concatenate([place, box[:, 2:] / self.over_person], 1)
-
-    def _expect(self, count: int) -> None:
-        people = self.people
-        people.expect(people.config.detect_prob)
-        if count == 0:  # nobody is detected: does the detector look at this frame?
-            missed = np.prod(1 - people.existence() * people.detectable)
-            looks = missed * (1 - BLIND_SHARE)
-            people.expect(people.config.detect_prob * looks / max(looks + BLIND_SHARE, 1e-300))
 
     def _associate(
         self, box: Array, z: Array, ratio: Array, free: Array, image: Image | None, gate: float
