@@ -27,7 +27,7 @@ from sim.stuck import Immobile, NeverArrives
 
 Plane = Literal["ground", "space", "image"]
 Unit = Literal["person", "group"]
-DetectionMode = Literal["image", "truth", "file"]
+DetectionMode = Literal["image", "truth", "file", "both"]
 BACKGROUNDS = 50  # empty frames that precede frame 1 of a simulated sequence
 OWN_BACKGROUND = f"{BACKGROUNDS} empty frames before frame 1"
 # m of a unit of length that the name of a column, as x_cm, may end with
@@ -481,7 +481,7 @@ class Sequence:
 
 class Tracker(Protocol):
     """The interface of a tracker. needs: one or more of "pixels" (pictures), "stereo" (left and right pictures),
-    "boxes" and "points" (detections). The tracker can work with each of these inputs alone."""
+    "boxes", "points" (detections) and "pixels and boxes". The tracker can work with each of these inputs alone."""
 
     needs: Any  # tuple[str, ...]; Any, so that a class need not say so
 
@@ -491,5 +491,6 @@ class Tracker(Protocol):
     # Any: a tracker that needs detections always gets them, and may say so.
     def step(self, frame: Frame, detections: Any) -> Tracks:
         """Returns this tracker's tracks of `frame`, from this and earlier frames only. detections: those of the frame,
-        possibly with zero rows (Detections); None if the tracker is given pictures only."""
+        possibly with zero rows (Detections); None if the tracker is given pictures only. A tracker that
+        needs "pixels and boxes" may get both, and any picture alone."""
         ...

@@ -73,7 +73,7 @@ def _named(
     scorer: Scorer | None = None,
 ) -> tuple[list[Tracks], bool]:  # fmt: skip
     truth, mode = _truth(sequence), _mode(sequence, given)
-    if mode == "image":
+    if mode in ("image", "both"):
         places = given.get("input") == "stereo"
         return [_visible(truth, index, places) for index in range(1, truth.length + 1)], True
     seed = (given.get("seed") or 0) if given.get("sensor") else 0  # without errors it only shuffles the detections

@@ -32,10 +32,11 @@ HALVINGS = 6  # Bisections on the line from an allowed config to one that is not
 def space_of(kind: type[Config], mode: DetectionMode | None = None, *, online: bool = False) -> Space:
     """Returns the tunable parameters of a config class that have an effect in this detection mode.
 
-    "image" leaves out parameters with an effect on points only, "file" and "truth" those on pixels only, None nothing.
+    "image" and "both" leave out parameters with an effect on points only, "file" and "truth" those on pixels only, None
+    nothing.
     online: True leaves out parameters that may not change between two frames.
     """
-    without_effect = {"image": "points", None: None}.get(mode, "pixels")
+    without_effect = {"image": "points", "both": "points", None: None}.get(mode, "pixels")
     return tuple(p for p in kind.space(online=online) if p.sees == "" or p.sees != without_effect)
 
 

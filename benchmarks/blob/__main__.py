@@ -2,6 +2,7 @@
 
     python -m benchmarks.blob options [--scenes 30] [--data FOLDER]
     python -m benchmarks.blob ground [--seeds 0:2]
+    python -m benchmarks.blob both [pets] [rendered] [faults] [evidence] [--data FOLDER] [--seeds 0:2]
     python -m benchmarks.blob pixels [pets] [rendered] [hall] [standing] [above] [--data FOLDER] [--seeds 0:2]
     python -m benchmarks.blob degraded [grey] [tinted] [mpeg2] … [--seeds 20000:20002]
 
@@ -11,13 +12,14 @@ all but `above`).
 
 from __future__ import annotations
 
-from benchmarks.blob import degraded, ground, options, pixels
+from benchmarks.blob import both, degraded, ground, options, pixels
 from benchmarks.support.options import PETS, add_data, add_seeds, new_parser, one_thread
 
 PARTS = {
     "options": (),
     "ground": (),
     "degraded": tuple(degraded.KINDS),
+    "both": ("pets", "rendered", "faults", "evidence"),
     "pixels": ("pets", "rendered", "hall", "standing", "above"),
 }
 
@@ -27,7 +29,7 @@ def main() -> None:
     parser.add_argument("mode", choices=PARTS)
     parser.add_argument("part", nargs="*", help="parts of the mode")
     parser.add_argument("--scenes", type=int, default=30, help="options: scenes with occlusion")
-    add_seeds(parser, "0:2", what="ground, pixels, degraded: ")
+    add_seeds(parser, "0:2", what="both, degraded, ground, pixels: ")
     add_data(parser)
     args = parser.parse_intermixed_args()
     unknown = set(args.part) - set(PARTS[args.mode])
@@ -40,6 +42,8 @@ def main() -> None:
         ground.ground(args.seeds)
     elif args.mode == "degraded":
         degraded.degraded(args.part, args.seeds)
+    elif args.mode == "both":
+        both.both(args.part or [*PARTS["both"]], args.data / PETS, args.seeds)
     else:
         pixels.pixels(args.part or PARTS["pixels"][:-1], args.data / PETS, args.seeds)
 

@@ -28,7 +28,8 @@ from tracking.running.tracker_registry import find, names
 
 FPS = 5
 # Frames tracked, by kind of detections.
-LENGTHS = {"file": 15, "image": 12}
+LENGTHS = {"file": 15, "image": 12, "both": 12}
+WITH_PICTURES = ("image", "both")
 
 
 def forbidden_truth() -> Truth:
@@ -38,8 +39,8 @@ def forbidden_truth() -> Truth:
 @cache
 def recorded(scenario: str, mode: str) -> tuple[Sequence, tuple[Frame, ...]]:
     """The sequence of a scenario without its truth, and its first frames, made once for all trackers."""
-    streams = ("left", "right", "background") if mode == "image" else ()
-    settings = [f"camera.fps={FPS}"] + (["camera.image=[160,120]"] if mode == "image" else [])
+    streams = ("left", "right", "background") if mode in WITH_PICTURES else ()
+    settings = [f"camera.fps={FPS}"] + (["camera.image=[160,120]"] if mode in WITH_PICTURES else [])
     sequence = simulate(load(scenario, settings), 40_001, 0, streams)
     return replace(sequence, load_truth=forbidden_truth), tuple(islice(sequence, LENGTHS[mode]))
 
@@ -72,13 +73,15 @@ def content(tracks: list[Tracks]) -> list[bytes]:
     return [b"".join(a.tobytes() for a in arrays(t)) + repr([repr(e) for e in t.events]).encode() for t in tracks]
 
 
-@pytest.mark.parametrize("mode", ["file", pytest.param("image", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("mode", ["file", *(pytest.param(mode, marks=pytest.mark.slow) for mode in WITH_PICTURES)])
 @pytest.mark.parametrize("tracker", names())
 @pytest.mark.parametrize("scenario", scenario_names())
 def test_contract(scenario: str, tracker: str, mode: str) -> None:
     needs = find(tracker).needs
     if mode == "image" and not {"pixels", "stereo", "boxes"} & set(needs):
         pytest.skip(f"{tracker} takes no pictures")
+    if mode == "both" and "pixels and boxes" not in needs:
+        pytest.skip(f"{tracker} does not take both at once")
     length = LENGTHS[mode]
     whole = cut(scenario, mode, length)
     before = [[a.copy() for a in arrays(frame)] for frame in whole]
@@ -110,7 +113,7 @@ def test_contract(scenario: str, tracker: str, mode: str) -> None:
     prefix = prepare(tracker, cut(scenario, mode, length // 2), detections=mode)
     assert content(run(prefix)) == content(tracks)[: length // 2], "a sequence cut short gives other tracks"
     assert content(run(ready)) == content(tracks), "after a reset the same input gives other tracks"
-    if mode == "file":
+    if mode in ("file", "both"):
         assert same_answers(tracks, run(prepare(tracker, reordered(whole, 1), detections=mode))) == ""
 
 

@@ -52,6 +52,7 @@ MIN_DURATION = partial(
     metavar="DURATION")
 Images = Literal["jpg", "png", "mp4"] | None
 Detections = Literal["image", "truth", "file"] | None
+DetectionsOrBoth = Literal["image", "truth", "file", "both"] | None
 Similarity = Literal["boxes", "ground", "image"] | None
 
 
@@ -163,8 +164,9 @@ class TrackOptions(SceneOptions, BoxOptions, words="track"):
     out: Path = OUT()
     params: str | None = option(
         "The tracker's parameters: a file, or a preset such as paper.", None, metavar="FILE.toml|PRESET")
-    detections: Detections = option(
-        "Detections that the tracker gets. Default: the first of image, file, truth that can be.", None)
+    detections: DetectionsOrBoth = option(
+        "Detections that the tracker gets. Default: the first of image, file, truth that can be; with --boxes both, if "
+        "tracker and source can, else file.", None)
     boxes: Path | None = option(
         "A detector's boxes on the pictures: MOT text, table with named columns (frames or times), COCO results.", None,
         metavar="FILE")

@@ -21,7 +21,7 @@ from tracking.errors.causes import Cause, Facts, cause_of_ghost, cause_of_group,
 from tracking.errors.groups import LINEAGE, GroupError, Memberships, group_errors, wrong_lineages
 from tracking.errors.people import PersonError, matched_people, person_errors
 from tracking.errors.repairs import SHOWN, ComparedPeople, ComparedRun, scores
-from tracking.grouping.foot_points import source_of
+from tracking.grouping.foot_points import FEETLESS, source_of
 from tracking.oracle import named_detections
 from tracking.running.run import TrackingRun
 from tracking.scoring.evaluation import MatchedSides
@@ -141,7 +141,7 @@ def find_errors(
             remedy="state it with --px-per-m",
         )  # fmt: skip
     run, (_, place, _) = _compared_run(compared[0], tracked), _places(compared[0])
-    of = _facts(sequence, compared[0], None if seen is None else compared[1], source_of(tracks) in ("pixels", "stereo"))
+    of = _facts(sequence, compared[0], None if seen is None else compared[1], source_of(tracks) in FEETLESS)
     found = [FoundError(*one, None) for one in _with_causes(compared[0], tracked, run, place, of)]
     whole = scores(run) if costs or causes else {}
     found.sort(key=lambda one: one.error.start - one.error.end)

@@ -27,6 +27,7 @@ LEARNED = 2000  # boxes after which the calibration of scores is kept
 DOUBT = 10.0  # boxes of each kind that each range of scores has in advance
 LIFETIME = 15.0  # s: mean time that a person is in view
 CLUTTER_TIME = 0.05  # s: mean time that a false box lasts
+LASTING = 0.05  # share of a detector's false boxes that last, as on a poster
 BIRTH_RATE = 0.5  # 1/s: new people
 SHOWN_TIME = 1.0  # s: mean time in which a person can be detected
 
@@ -60,6 +61,32 @@ def update(states: Array, rows: Ints, p: Array, g: Array, ratio: Array | float) 
     states[SHOWN] *= shown
     states[FALSE] *= false
     states /= states.sum(0) + nothing
+
+
+def shown_share(hidden_time: float) -> float:
+    """Returns the share of time in which a person can be detected; hidden_time: as of `transition`."""
+    return SHOWN_TIME / (SHOWN_TIME + hidden_time)
+
+
+def update_by_detector(
+    states: Array, shown: Array, lasting: Array, rows: Ints, p: Array, g: Array, ratio: Array
+) -> None:
+    """Updates `states` (3, N), `shown` (N,) and `lasting` (N,) in place with a detector's boxes beside pictures.
+
+    rows, p, g, ratio: as of `update`. shown: probability that a person can be seen by the detector, whether or not in
+    the picture. lasting: probability that what is no person and no passing false object is a lasting false one.
+    """
+    nothing, person, false = 1 - states.sum(0), 1 - p, 1 - p
+    measured = p[rows] * g
+    person[rows] += measured * ratio
+    false[rows] += measured
+    likely = shown * person + (1 - shown)
+    shown *= person / likely
+    states[[SHOWN, HIDDEN]] *= likely
+    states[FALSE] *= false
+    lasts, gone = nothing * lasting * false, nothing * (1 - lasting)
+    lasting[:] = lasts / np.maximum(lasts + gone, 1e-300)
+    states /= states.sum(0) + lasts + gone
 
 
 class ScoreCalibration:

@@ -21,7 +21,7 @@ from tracking.grouping.grouped_tracks import GroupsSoFar, groups_in_frames, move
 from tracking.grouping.grouping_choice import Grouping
 from tracking.grouping.tracks_table import TracksTable, tabulate
 
-FEETLESS = ("pixels", "stereo")  # Inputs of trackers whose tracks stay in the image.
+FEETLESS = ("pixels", "stereo", "pixels and boxes")  # Inputs of trackers whose tracks stay in the image.
 
 
 def plane_of_run(tracks: Sequence[Tracks]) -> str | None:

@@ -3,9 +3,10 @@
     image  the tracker's own detector works on the pictures: the frames come without detections
     file   the detections stored with the sequence (det/det.txt)
     truth  the labelled positions or boxes, degraded only by the sensor settings of the command
+    both   the pictures and the boxes stored with the sequence
 
-A tracker lists in `needs` what it can work with: pixels, stereo, boxes, points. It works with any one of them, and gets
-no more than it lists: `as_needed`.
+A tracker lists in `needs` what it can work with: pixels, stereo, boxes, points, and "pixels and boxes" if it uses both
+at once. It works with any one of them, and gets no more than it lists: `as_needed`.
 """
 
 from __future__ import annotations
@@ -22,16 +23,17 @@ from sim.scene.standing import standing_points
 from sim.types import DetectionMode, Detections, Frame, Ints, Sequence
 from tracking.running.tracks_check import finite
 
-InputKind = Literal["points", "boxes", "pixels", "stereo"]
+BOTH = "pixels and boxes"
+InputKind = Literal["points", "boxes", "pixels", "stereo", "pixels and boxes"]
 
 
 def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: DetectionMode | None) -> DetectionMode:
-    """Returns the requested detection mode; for None the first of "image", "file" and "truth" that is possible.
+    """Returns the requested detection mode; for None the first of "image", "file", "truth" and "both" that is possible.
 
     A mode is possible if the sequence has what a tracker with these needs takes in it. Raises InputError if the
     requested mode, or for None every mode, is impossible.
     """
-    able = [mode for mode in ("image", "file", "truth") if _works(mode, needs, sequence)]
+    able = [mode for mode in ("image", "file", "truth", "both") if _works(mode, needs, sequence)]
     if requested in able or (requested is None and able):
         return requested or able[0]  # type: ignore[return-value]
     there = {
@@ -39,7 +41,8 @@ def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: Detection
         "truth": sequence.load_truth is not None,
     }  # fmt: skip
     contents, place = ", ".join(name for name, known in there.items() if known) or "nothing", "--detections"
-    got = f"a tracker that needs {' or '.join(needs)}, and {sequence.name} with {contents}"
+    needed = " or ".join(need for need in needs if need != BOTH) or BOTH
+    got = f"a tracker that needs {needed}, and {sequence.name} with {contents}"
     remedy = f"try --detections {able[0]}" if able else "take another, or give a detector's boxes with --boxes FILE"
     place += "" if requested is None else f" {requested}"
     raise InputError(place=place, got=got, expected="what both have", remedy=remedy)
@@ -48,14 +51,18 @@ def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: Detection
 def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
     if mode == "image":
         return ("pixels" in needs and sequence.has_images) or ("stereo" in needs and sequence.has_right)
+    if mode == "both":
+        return BOTH in needs and sequence.has_images and sequence.has_detections
     takes = {"boxes", "points"} & set(needs)
     return bool(takes) and (sequence.has_detections if mode == "file" else sequence.load_truth is not None)
 
 
 def input_kind(needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, frames: Iterable[Frame]) -> InputKind:
-    """Returns what a tracker with these needs works on in this mode: "pixels", "stereo", "boxes" or "points". frames:
-    with the detections that the tracker gets; used only by a tracker that takes boxes and points: of detections in the
-    image it works on the boxes, of others on the points."""
+    """Returns what a tracker with these needs works on in this mode: "pixels", "stereo", "boxes", "points" or "pixels
+    and boxes". frames: with the detections that the tracker gets; used only by a tracker that takes boxes and points:
+    of detections in the image it works on the boxes, of others on the points."""
+    if mode == "both":
+        return "pixels and boxes"
     if mode == "image":
         return "pixels" if "pixels" in needs and sequence.has_images else "stereo"
     if not {"boxes", "points"} <= set(needs):
@@ -76,8 +83,8 @@ class Given:
 def given_detections(
     mode: DetectionMode, sequence: Sequence, sensor: Mapping[str, Any], seed: int, *, owned: bool = False
 ) -> Given:
-    """Returns the detections of the mode "file" or "truth". sensor, seed: degrade and shuffle those of "truth". owned:
-    whether the owners of stored detections are read, too."""
+    """Returns the detections of the mode "file", "both" or "truth". sensor, seed: degrade and shuffle those of "truth".
+    owned: whether the owners of stored detections are read, too."""
     if mode == "truth":
         from tracking.running.truth_detections import from_truth
 
@@ -89,11 +96,12 @@ def given_detections(
 def as_needed(given: Given, needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence) -> Given:
     """Returns the detections as a tracker with these needs gets them.
 
-    Without "boxes" among the needs they have no boxes. Without "points" their positions follow from their boxes. With a
-    camera that is where the bodies with the boxes stand on the ground; a box whose foot shows no ground is left out.
-    Without a camera it is the middle of the box. Raises InputError if the needs lack "points" and there are no boxes.
+    Without "boxes" and "pixels and boxes" among the needs they have no boxes. Without "points" their positions follow
+    from their boxes. With a camera that is where the bodies with the boxes stand on the ground; a box whose foot shows
+    no ground is left out. Without a camera it is the middle of the box. Raises InputError if the needs lack "points"
+    and there are no boxes.
     """
-    if "boxes" not in needs:
+    if {"boxes", BOTH}.isdisjoint(needs):
         return Given([None if d is None else d.replace(box=None) for d in given.detections], given.owners)
     if "points" in needs:
         return given

@@ -40,10 +40,10 @@ from sim.types import (
 )
 from tracking.grouping.ground_of_boxes import LONGEST
 from tracking.grouping.grouping_choice import Grouping, default_grouping, grouping_of
-from tracking.running import image_scale
+from tracking.running import image_scale, tracker_registry
 from tracking.running.counted_region import Mask, counted_region, detections_inside, inside_region
-from tracking.running.detection_mode import Given, as_needed
-from tracking.running.prepare import Params, PreparedTracker, prepare
+from tracking.running.detection_mode import BOTH, Given, as_needed
+from tracking.running.prepare import PICTURED, Params, PreparedTracker, prepare
 from tracking.running.run_info import run_info
 from tracking.running.time_limit import TimeLimited
 
@@ -256,13 +256,13 @@ class Live:
             if image is None and found is None:
                 remedy = "give one; boxes=[] if nobody was found"
                 raise InputError(place="step", got="nothing", expected="a picture, boxes or points", remedy=remedy)
-            self.mode = "image" if image is not None else "file"
+            self.mode = self._mode(image is not None, found is not None)
             size = self.sequence.image_size or (None if image is None else image.shape[1::-1])
             self.sequence = replace(
                 self.sequence, image_size=size, has_images=image is not None, has_right=right is not None,
                 has_detections=found is not None,
             )  # fmt: skip
-        if self.mode == "file" and image is not None:
+        if self.mode == "file" and image is not None and not self.sequence.has_images:
             remedy = "give pictures from the first frame on, or never"
             raise InputError(place=f"frame {index}", got="a picture", expected="boxes or points", remedy=remedy)
         if self.mask is None:
@@ -273,19 +273,28 @@ class Live:
         found = None if found is None else detections_inside(found, self.region, above)
         return Frame(index, t, inside_region(image, self.region), inside_region(right, self.region), found)
 
+    def _mode(self, pictures: bool, detections: bool) -> DetectionMode:
+        given: Any = self.tracker.tracker if isinstance(self.tracker, TimeLimited) else self.tracker
+        needs = (tracker_registry.find(given) if isinstance(given, str | type) else given).needs
+        if pictures and detections and BOTH in needs:
+            return "both"
+        return "image" if pictures and not {"pixels", "stereo"}.isdisjoint(needs) else "file" if detections else "image"
+
     def _take(self, frame: Frame) -> list[Tracks]:
         """Returns the tracks, of this frame or of earlier ones, too, that are completed now."""
+        if self.running is None and self.pictures is not None and self.mode in PICTURED:
+            self._begin()
         if self.running is None:
-            self.waiting.append(frame if self.mode == "file" else Frame(frame.index, frame.t))
+            self.waiting.append(frame if self.mode == "file" else frame.replace(image=None, right=None))
             return self._begin() if self._learned(frame) else []
         return self._step(frame)
 
     def _step(self, frame: Frame) -> list[Tracks]:
         assert self.running is not None
         needs, found = self.running.prepared.tracker.needs, frame.detections
-        if self.mode == "file":
-            found = as_needed(Given([found]), needs, "file", self.sequence).detections[0]
-        frame = frame.replace(detections=found if self.mode == "file" else None)
+        if self.mode != "image":
+            found = as_needed(Given([found]), needs, self.mode or "file", self.sequence).detections[0]
+        frame = frame.replace(detections=None if self.mode == "image" else found)
         reported = self.running.step(frame)
         self.reported = reported[-1] if reported else None
         return self._counted(self.running.completion.add(reported))
@@ -297,9 +306,7 @@ class Live:
 
     def _learned(self, frame: Frame) -> bool:
         """Returns whether the tracker can begin, after a frame."""
-        if self.mode == "image":
-            if self.pictures is not None:
-                return True
+        if self.mode in PICTURED:
             if frame.image is not None and frame.index in self.choice.indices(self.choice.count):
                 self.sample.append(frame.image.copy())
             return frame.index >= self.choice.count
@@ -315,7 +322,7 @@ class Live:
     def _begin(self) -> list[Tracks]:
         """Makes the tracker, and returns the tracks of the frames that waited."""
         waiting, self.waiting = self.waiting, []
-        if self.mode == "image":
+        if self.mode in PICTURED:
             pictures = self.pictures if self.pictures is not None else np.array(self.sample)
             choice = self.choice if self.pictures is None else None
             source = {
@@ -325,7 +332,7 @@ class Live:
             load = GivenSample(choice, pictures)
             self.sequence = replace(self.sequence, load_background=load, source=source)
             self.sample = []
-        else:
+        if self.mode != "image":
             self.sequence = replace(self.sequence, frames=_Frames(waiting))
         prepared = prepare(self.tracker, self.sequence, params=self.params, detections=self.mode, seed=self.seed)
         self.sequence = replace(self.sequence, frames=_no_frames, load_background=None)
@@ -336,7 +343,7 @@ class Live:
     def _now(self, completed: list[Tracks]) -> Now:
         learns = ""
         if self.running is None:
-            learns = "background" if self.mode == "image" else "scale"
+            learns = "background" if self.mode in PICTURED else "scale"
         elif not self.running.completion.settled and self.running.completion.waiting:
             learns = "ground"
         t = max(self.index - 1, 0) / self.sequence.fps

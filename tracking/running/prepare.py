@@ -43,6 +43,7 @@ from tracking.running.tracks_check import ReportHistory, check_tracks
 from tracking.running.used_files import inside, owner_of
 from tracking.user_code import tracker_failed, user_code
 
+PICTURED = ("image", "both")  # Modes in which a tracker gets pictures.
 DIAGNOSTICS = JSON_BYTES // 8  # characters; run.json has indented lines
 # A config, parameter values by name, the name of a preset, the path of a TOML file, or None for the defaults.
 Params = Config | Mapping[str, Any] | str | Path | None
@@ -58,7 +59,7 @@ class PreparedTracker:
     context: Context
     mode: DetectionMode
     sequence: Sequence
-    # with detections and without pictures; None: the sequence's own frames (mode "image")
+    # with detections and without pictures; None: the sequence's own frames (mode "image"); "both": these with pictures
     frames_given: tuple[Frame, ...] | None
     given: InputFrames | None = None  # as `frames_given`, and what these were chosen from
     scale_frames: int = 0  # as of ImageScale
@@ -74,9 +75,13 @@ class PreparedTracker:
 
     def frames(self) -> Iterator[Frame]:
         """Returns a new iterator over the frames as the tracker gets them, in order. Each call starts at frame 1."""
-        if self.frames_given is not None:
-            return iter(self.frames_given)
-        return (replace(f, detections=None) for f in self.masked or self.sequence)
+        sequence = self.masked or self.sequence
+        if self.frames_given is None:
+            return (replace(f, detections=None) for f in sequence)
+        if self.mode == "both":
+            pairs = zip(sequence, self.frames_given, strict=True)
+            return (replace(frame, detections=given.detections) for frame, given in pairs)
+        return iter(self.frames_given)
 
     def scale(self, tracks: SequenceOf[Tracks]) -> ImageScale:
         """Returns the image scale for deriving groups from the tracks of frames 1 to now; nan if unknown. It is the
@@ -166,8 +171,8 @@ def input_frames(
     mode: DetectionMode, needs: tuple[str, ...], sequence: Sequence, sensor: Mapping[str, Any], seed: int,
     *, owned: bool = False,
 ) -> InputFrames:  # fmt: skip
-    """Returns the frames with the detections of the mode "file" or "truth", as a tracker with these needs gets them.
-    The other arguments are as of `given_detections`."""
+    """Returns the frames with the detections of the mode "file", "both" or "truth", as a tracker with these needs gets
+    them. The other arguments are as of `given_detections`."""
     given = given_detections(mode, sequence, sensor, seed, owned=owned)
     seen = as_needed(given, needs, mode, sequence)
     scale = image_scale.of_sequence(sequence, given)
@@ -211,16 +216,16 @@ def prepare(
     if mask is not None:
         region = counted_region(mask, sequence.image_size)
         above = sequence.camera is not None and sequence.camera.kind == "top"
-        if frames is None:
+        if mode in PICTURED:
             masked = with_masked_pictures(sequence, region)
-        else:
+        if frames is not None:
             frames = tuple(
                 f if f.detections is None else replace(f, detections=detections_inside(f.detections, region, above))
                 for f in frames
             )
-    background = (masked or sequence).background() if mode == "image" else None
+    background = (masked or sequence).background() if mode in PICTURED else None
     context = Context(sequence.fps, scale.px_per_m, sequence.camera, sequence.scene, sequence.image_size, background)
-    untracked = untracked_frames(sequence.load_background) if mode == "image" else 0
+    untracked = untracked_frames(sequence.load_background) if mode in PICTURED else 0
     return PreparedTracker(
         name, instance, config, context, mode, sequence, frames, given, scale.frames, untracked, masked
     )

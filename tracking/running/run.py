@@ -113,8 +113,9 @@ def track(
         sequence: A `Sequence`, as `sim.simulate` and `tracking.recordings.source.open_source` return.
         params: A config, values by name, the name of a preset, or the path of a TOML file. None takes the tracker's
             defaults; it must be None if `tracker` is an instance.
-        detections: "image" (the tracker detects in pictures), "file" (stored detections) or "truth" (detections made
-            from labels). None takes the first of these, in this order, that tracker and sequence allow.
+        detections: "image" (the tracker detects in pictures), "file" (stored detections), "truth" (detections made
+            from labels) or "both" (pictures and stored boxes). None takes the first of these, in this order, that
+            tracker and sequence allow.
         sensor: Settings as in a scenario's [sensor] that degrade the detections of "truth"; None degrades nothing.
         seed: Seed of the random numbers of tracker and sensor.
         grouping: How groups are derived: "belief", "rule", a TOML file of either, or a `Belief` or `LinkRule`. None

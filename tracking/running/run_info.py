@@ -38,7 +38,7 @@ def run_info(
     sample = prepared.context.background
     begins = 1 if sample is None else causal_from(prepared.sequence)
     diagnostics = prepared.diagnostics("after the last frame")
-    stored = prepared.given if prepared.mode == "file" else None
+    stored = prepared.given if prepared.mode in ("file", "both") else None
     return {
         "tracker": prepared.name,
         "config": prepared.config.as_dict() if prepared.config else {},
@@ -104,12 +104,12 @@ def input_summary(info: Mapping[str, Any]) -> str:
 
 def input_name(info: Mapping[str, Any]) -> str:
     """Returns a short name of a tracker's input, from the content of its run.json; "" if it is unknown. Examples:
-    "pixels", "boxes (file)", "points (truth, noise_m = 0.1, seed 3)"."""
+    "pixels", "pixels and boxes", "boxes (file)", "points (truth, noise_m = 0.1, seed 3)"."""
     kind, mode, sensor = (info.get(key) for key in ("input", "detections", "sensor"))
     if kind is None:
         return ""
     more = [*(f"{key} = {value}" for key, value in sensor.items()), f"seed {info.get('seed')}"] if sensor else []
-    return str(kind) if mode == "image" else f"{kind} ({', '.join([str(mode), *more])})"
+    return str(kind) if mode in ("image", "both") else f"{kind} ({', '.join([str(mode), *more])})"
 
 
 # Keys of run.json that follow from tracks and sequence, whoever made the tracks.

@@ -25,7 +25,7 @@ REGISTRY = {
     "joint": "tracking.papers.joint.tracker:Joint",
     "stereo": "tracking.papers.stereo.tracker:Stereo",
 }
-NEEDS = ("pixels", "stereo", "boxes", "points")
+NEEDS = ("pixels", "stereo", "boxes", "points", "pixels and boxes")
 
 
 def names() -> tuple[str, ...]:

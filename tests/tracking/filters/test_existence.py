@@ -37,6 +37,30 @@ def test_a_miss_lowers_existence_by_as_much_as_the_person_could_be_seen():
     assert left[0] > left[1] > left[2]
 
 
+def test_two_sensors_are_weighed_by_bayes_rule():
+    """The states are enumerated: seen by the picture or not, by the detector or not, false, lasting false, gone."""
+    p, g, ratio, shown, lasting = 0.6, 5.0, 2.0, 0.7, 0.3
+    measured, false, missed = 1 - p + p * g * ratio, 1 - p + p * g, 1 - p
+    for rows, likely, unlikely in (([0], measured, false), ([], missed, missed)):
+        made, detector, lasts = states([0.3, 0.2, 0.4]), np.array([shown]), np.array([lasting])
+        k = len(rows)
+        values = np.array([p]), np.full(k, g), np.full(k, ratio)
+        existence.update_by_detector(made, detector, lasts, np.array(rows, int), *values)
+        seen, unseen = shown * likely, 1 - shown
+        weights = [0.3 * seen, 0.3 * unseen, 0.2 * seen, 0.2 * unseen, 0.4 * unlikely]
+        weights = np.array([*weights, 0.1 * lasting * unlikely, 0.1 * (1 - lasting)])
+        weights /= weights.sum()
+        assert made[:, 0] == pytest.approx([weights[:2].sum(), weights[2:4].sum(), weights[4]])
+        assert detector[0] == pytest.approx((weights[0] + weights[2]) / weights[:4].sum())
+        assert lasts[0] == pytest.approx(weights[5] / weights[5:].sum())
+
+
+def test_a_person_is_shown_for_a_share_of_the_time():
+    short = existence.transition(0.1, 0.5)[:2, :2] * np.exp(0.1 / existence.LIFETIME)
+    share = np.array([existence.shown_share(0.5), 1 - existence.shown_share(0.5)])
+    assert short @ share == pytest.approx(share)
+
+
 def test_equal_scores_tell_nothing():
     scores = ScoreCalibration()
     assert scores.ratios(np.ones(3)).tolist() == [1.0, 1.0, 1.0]

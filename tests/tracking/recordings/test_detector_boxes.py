@@ -62,9 +62,17 @@ def test_tracks_of_boxes_on_a_video(tmp_path, video, capsys):
     boxes = coco(tmp_path / "det.json", category_id=3)
     command = ["track", "blob", str(video), "--boxes", str(boxes), "--px-per-m", "18"]
     assert run([*command, "--out", str(tmp_path / "a")]) == 2  # nobody is of category 1
-    assert run([*command, "--class", "3", "--out", str(tmp_path / "a")]) == 0
+    assert run([*command, "--class", "3", "--out", str(tmp_path / "both")]) == 0
+    info = json.loads((tmp_path / "both" / "run.json").read_text())
+    assert (info["detections"], info["input"]) == ("both", "pixels and boxes")
+    assert info["detections_hash"]
+    assert info["background"]
+    capsys.readouterr()
+    assert run([*command, "--class", "3", "--detections", "file", "--out", str(tmp_path / "a")]) == 0
     assert "12 frames, 1 track, 0 groups" in capsys.readouterr().out
     assert json.loads((tmp_path / "a" / "run.json").read_text())["detections"] == "file"
+    assert run(["track", "relational", *command[2:], "--class", "3", "--out", str(tmp_path / "other")]) == 0
+    assert json.loads((tmp_path / "other" / "run.json").read_text())["detections"] == "file"
     assert run(["overlay", str(video), str(tmp_path / "a"), "--out", str(tmp_path / "a.mp4")]) == 0
     assert run([*command, "--detections", "image", "--out", str(tmp_path / "b")]) == 2
 

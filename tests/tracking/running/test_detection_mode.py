@@ -7,7 +7,7 @@ import pytest
 
 from scenarios.errors import InputError
 from sim.types import Detections, Sequence
-from tracking.running.detection_mode import check_detections, choose_mode
+from tracking.running.detection_mode import check_detections, choose_mode, input_kind
 
 
 def source(**has):
@@ -21,6 +21,7 @@ DEFAULT_MODES = [
     (("pixels", "boxes"), {"has_detections": True}, "file"),
     (("stereo", "points"), {"has_images": True, "load_truth": lambda: None}, "truth"),
     (("stereo",), {"has_images": True, "has_right": True}, "image"),
+    (("pixels and boxes",), {"has_images": True, "has_detections": True}, "both"),
 ]
 
 
@@ -29,7 +30,20 @@ def test_default_mode(needs, has, expected):
     assert choose_mode(needs, source(**has), None) == expected
 
 
+USES_BOTH = ("pixels", "boxes", "pixels and boxes")
+
+
+def test_a_tracker_that_can_do_without_gets_both_only_if_asked_for():
+    sequence = source(has_images=True, has_detections=True)
+    assert choose_mode(USES_BOTH, sequence, None) == "image"
+    assert choose_mode(USES_BOTH, sequence, "both") == "both"
+    assert input_kind(USES_BOTH, "both", sequence, ()) == "pixels and boxes"
+
+
 IMPOSSIBLE_MODES = [
+    (("pixels", "boxes"), {"has_images": True, "has_detections": True}, "both"),
+    (USES_BOTH, {"has_images": True, "load_truth": lambda: None}, "both"),
+    (USES_BOTH, {"has_detections": True}, "both"),
     (("boxes",), {"has_images": True}, None),
     (("boxes",), {"has_detections": True}, "truth"),
     (("boxes",), {"has_images": True, "has_detections": True}, "image"),

@@ -55,12 +55,23 @@ def played(live, frames, given, again=None):
 
 KINDS = {
     "pixels": ("image", lambda f: {"image": f.image}),
+    "both": (
+        "both",
+        lambda f: {
+            "image": f.image,
+            "boxes": f.detections.box,
+            "points": f.detections.pos,
+            "scores": f.detections.score,
+        },
+    ),
     "boxes": ("file", lambda f: {"boxes": f.detections.box, "points": f.detections.pos, "scores": f.detections.score}),
 }
 
 
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("name", [name for name in names() if name != "stereo"])
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [(name, kind) for name in names() if name != "stereo" for kind in ("pixels", "boxes")] + [("blob", "both")],
+)
 def test_every_tracker_says_live_what_it_says_of_the_recording(scene, name, kind):
     sequence, frames = scene
     mode, given = KINDS[kind]

@@ -90,6 +90,19 @@ def test_sensor_overrides_degrade_the_labels():
         track("blob", source(load_truth=truth), detections="truth", sensor={"detect_prob": 2.0})
 
 
+def test_pictures_and_stored_boxes_at_once():
+    settings = ["camera.fps=5", "camera.image=[160,120]", "duration=4"]
+    scene = simulate(load("side-by-side", settings), 40_001, streams=("left", "background"))
+    run = track("blob", scene, detections="both")
+    assert run.info["input"] == "pixels and boxes"
+    assert run.info["detections_hash"] == track("blob", scene, detections="file").info["detections_hash"]
+    assert run.info["background"]
+    frames = list(prepare("blob", scene, detections="both").frames())
+    assert all(f.image is not None and f.detections.box is not None for f in frames)
+    with pytest.raises(InputError, match=r"--detections both: got a tracker that needs pixels or points or boxes"):
+        track("relational", scene, detections="both")
+
+
 def hidden(group):
     return {"hide": [{"start": 1.0, "end": 2.0, "group": group}]}
 

@@ -10,6 +10,7 @@ import time
 import warnings
 from collections.abc import Callable
 from contextlib import nullcontext
+from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
@@ -28,7 +29,7 @@ from tracking.app.tracker_setup import TrackerSetup
 from tracking.config import Config
 from tracking.grouping.grouping_choice import grouping_of
 from tracking.recordings.live_source import is_live
-from tracking.running.detection_mode import choose_mode
+from tracking.running.detection_mode import BOTH, choose_mode
 from tracking.running.run import TrackingRun
 from tracking.running.run_info import input_summary
 from tracking.running.time_limit import TimeLimited
@@ -52,10 +53,13 @@ def track(options: TrackOptions) -> CommandResult:
     if is_live(options.source, options.follow is not None):
         return track_live(setup, options)
     refuse_live_options(options)
-    path = Path(options.source)
-    pictures = setup.detections in (None, "image") and not {"pixels", "stereo"}.isdisjoint(find(setup.tracker).needs)
+    path, needs = Path(options.source), find(setup.tracker).needs
+    seen = {BOTH} if options.boxes is not None else {"pixels", "stereo"}
+    pictures = setup.detections in (None, "image", "both") and not seen.isdisjoint(needs)
     source = source_of(options, path, pictures)
     sequences = source.open()
+    if options.boxes is not None and setup.detections is None:
+        setup = replace(setup, detections="both" if pictures and sequences[0].has_images else "file")
     folders = run_folders(sequences, path, options.out)
     rows = list[dict[str, Any]]()
     with lock_folder(options.out):
@@ -119,11 +123,10 @@ def _setup(options: TrackOptions) -> TrackerSetup:
     rule = None if options.grouping is None else grouping_of(options.grouping)
     config = _config(options.tracker, options.params, own)
     limited = None if options.step_timeout is None else TimeLimited(options.tracker, options.step_timeout)
-    detections = options.detections or (None if options.boxes is None else "file")
-    if options.boxes is not None and detections != "file":
-        got, remedy = f"--detections {detections}", "leave --boxes or --detections out"
-        raise InputError(place="--boxes", got=got, expected="--detections file", remedy=remedy)
-    return TrackerSetup(options.tracker, config, detections, sensor, options.seed, rule, limited, options.mask)
+    if options.boxes is not None and options.detections not in (None, "file", "both"):
+        got, remedy = f"--detections {options.detections}", "leave --boxes or --detections out"
+        raise InputError(place="--boxes", got=got, expected="--detections file or both", remedy=remedy)
+    return TrackerSetup(options.tracker, config, options.detections, sensor, options.seed, rule, limited, options.mask)
 
 
 def _config(tracker: str, params: str | None, settings: list[str]) -> Config | None:
@@ -139,7 +142,7 @@ def _config(tracker: str, params: str | None, settings: list[str]) -> Config | N
 
 def _check_modes(setup: TrackerSetup, sequences: list[Sequence], background: str | None) -> None:
     modes = [choose_mode(find(setup.tracker).needs, sequence, setup.detections) for sequence in sequences]
-    if background is not None and "image" not in modes:
+    if background is not None and {"image", "both"}.isdisjoint(modes):
         got, expected = f"--detections {modes[0]}", "a tracker that works on pictures"
         raise InputError(place="--background", got=got, expected=expected, remedy="leave --background out")
     if setup.tracker == "stereo" and modes[0] != "image":

@@ -15,7 +15,7 @@ import numpy as np
 
 from sim.types import Array, Context, Ints
 from tracking.detect.person_size import upright
-from tracking.filters import kalman, track_uncertainty
+from tracking.filters import existence, kalman, track_uncertainty
 from tracking.papers.blob import person_look_kernels
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.tracked_people import TrackedPeople
@@ -35,9 +35,17 @@ class TrackedEllipses(TrackedPeople):
     direction's variance in a frame. In `bank` the coordinates are x, y, h, w: centre and full axes of the ellipse.
     """
 
-    columns: ClassVar[dict[str, int]] = {**TrackedPeople.columns, "angle": 1, "nominal": 1, "look": 0}
+    columns: ClassVar[dict[str, int]] = {
+        **TrackedPeople.columns,
+        "angle": 1,
+        "nominal": 1,
+        "look": 0,
+        "detector": 0,
+        "lasting": 0,
+    }
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
+        self.detector, self.lasting = np.zeros((2, 0))
         self.angle, self.nominal, self.look = np.zeros((2, 0)), np.zeros((5, 0, 4)), person_look_kernels.unknown(0)
         super().__init__(config, dynamics, context)
 
@@ -53,7 +61,13 @@ class TrackedEllipses(TrackedPeople):
         stay, their variances grow."""
         kalman.predict(self.nominal, self.dynamics.dt, self.q)
         self.angle[kalman.DIRECTION_VAR] += self.angle_var_per_step
+        nothing, person = 1 - self.states.sum(0), self.existence()
         super().predict(observed)
+        lost = person * -np.expm1(-self.dynamics.dt / existence.LIFETIME)
+        lasting = (nothing * self.lasting + existence.LASTING * lost) / np.maximum(1 - self.states.sum(0), 1e-12)
+        self.lasting = np.minimum(lasting, 1.0)
+        shown, hidden = self.transition[:2, :2]
+        self.detector = (shown[0] * self.detector + shown[1] * (1 - self.detector)) / (shown[0] + hidden[0])
 
     def compute_rho(self) -> Array:
         """Returns rho (N,) of all tracks: sqrt|S| over its asymptote, S the innovation covariance by the nominal
@@ -64,10 +78,14 @@ class TrackedEllipses(TrackedPeople):
         """Returns the bounding boxes (N, 4) of the tracks' ellipses: centre x, y, height, width, px."""
         return upright(self.bank[kalman.PLACE], self.angle[kalman.DIRECTION])
 
-    def start_tracks(self, z: Array, score: Array, t: float, person: Array) -> None:
+    def start_tracks(self, z: Array, score: Array, t: float, person: Array, *, boxed: bool = False) -> None:
         """Appends a track at rest for each ellipse z (K, 5): centre x, y, full axes h, w, px, direction theta, rad."""
         super().start_tracks(z, score, t, person)
+        if boxed:
+            self.states[existence.FALSE, self.states.shape[1] - len(z) :] *= 1 - existence.LASTING
         self._append(
+            detector=np.full(len(z), 1.0 if boxed else existence.shown_share(self.config.hidden_time)),
+            lasting=np.full(len(z), float(boxed)),
             angle=np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)]), look=person_look_kernels.unknown(len(z)),
             nominal=self.bank[:, self.bank.shape[1] - len(z) :],
         )  # fmt: skip

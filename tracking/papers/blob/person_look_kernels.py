@@ -93,6 +93,16 @@ def look_fits(image: Image, cover: Cover, templates: Array, k: int, look: Array,
 
 
 @kernel
+def pair_fits(image: Image, templates: Array, looks: Array, rows: Ints, columns: Ints) -> Array:
+    """Returns how well the looks (N, POINTS, 5) fit the picture with the templates (K, 4), (P,), of P pairs of looks
+    `rows` and templates `columns`. Points that a template with lower feet covers are hidden. image (H, W, 3) BGR."""
+    cover, found = np.zeros(image.shape[:2], np.int16), np.empty(len(rows))
+    for pair in range(len(rows)):
+        found[pair] = look_fits(image, cover, templates, columns[pair], looks[rows[pair]], 0, 1.0)[0, 0]
+    return found
+
+
+@kernel
 def learn(image: Image, templates: Array, looks: Array, rows: Ints, least_gain: float) -> None:
     """Learn, in place, the looks (K, POINTS, 5) at `rows` from the image under the points of the templates (K, 4).
 

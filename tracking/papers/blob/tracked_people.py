@@ -125,7 +125,12 @@ class TrackedPeople:
         if not self.by_existence:
             self.rho = self.compute_rho()
         self.states[:] = self.transition @ self.states
-        self.detect_prob = observed * self.config.detect_prob
+        self.expect(observed * self.config.detect_prob)
+
+    def expect(self, detect_prob: float) -> None:
+        """Computes the probability that each track is measured, where a person who can be detected and whom nobody
+        hides is detected with the probability `detect_prob`."""
+        self.detect_prob = detect_prob
         boxes, var = self.upright_boxes(), self.bank[kalman.VAR]
         shown = 1.0 if self.top else kernels.visible_shares(boxes, self.scale, self.existence(), var)
         self.detectable = self.detect_prob * shown * np.ones(len(self.id))
@@ -144,23 +149,31 @@ class TrackedPeople:
         """Returns the existence probability (N,) of all tracks."""
         return np.asarray(self.states[existence.SHOWN] + self.states[existence.HIDDEN])
 
-    def innovations(self, z: Array) -> tuple[Array, Array]:
-        """Returns d^2 (N, M) (eq. 9), and ln |2 pi S| (N,), in m, of N tracks and M boxes z (M, 4)."""
-        return kalman_kernels.distances(self.bank[kalman.PLACE], self.bank[kalman.VAR] + self.noise, z, self.scale)
+    def innovations(self, z: Array, noise: Array | None = None) -> tuple[Array, Array]:
+        """Returns d^2 (N, M) (eq. 9), and ln |2 pi S| (N,), in m, of N tracks and M boxes z (M, 4). noise (4,):
+        variances of the boxes, m^2; None: the config's."""
+        S = self.bank[kalman.VAR] + (self.noise if noise is None else noise)
+        return kalman_kernels.distances(self.bank[kalman.PLACE], S, z, self.scale)
 
     def evidence(self, rows: Ints, d2: Array, log_det: Array) -> Array:
         """Returns ln N(z; z_pred, S) over the density of false boxes, of P pairs of tracks `rows` and boxes, from d^2
         and ln |2 pi S|; all (P,)."""
         return np.asarray(-0.5 * (d2 + log_det) - np.log(self.false_density * np.square(self.scale[rows])))
 
-    def associate(self, rows: Ints, columns: Ints, d2: Array, evidence: Array, ratio: Array | float = 1.0) -> Ints:
+    def associate(
+        self, rows: Ints, columns: Ints, d2: Array, evidence: Array, ratio: Array | float = 1.0,
+        states: Array | None = None,
+    ) -> Ints:  # fmt: skip
         """Returns the indices (K,) of the associated pairs, one to one, of P pairs of tracks `rows` and measurements
-        `columns`, row by row. d2, evidence (P,): of `innovations` and `evidence`; ratio (P,): of the score."""
+        `columns`, row by row. d2, evidence (P,): of `innovations` and `evidence`; ratio (P,): of the score;
+        states (3, N): None takes those of the tracks."""
         if not self.by_existence:
             best = assignment.cheapest(columns, d2, rows)
             return best[assignment.cheapest(rows[best], d2[best], columns[best])]
         new, ratio = self._new_people() / self.config.clutter_rate, ratio * np.ones(len(rows))
-        cost = kernels.pair_costs(rows, evidence, ratio, new, self.detectable, self.states)
+        cost = kernels.pair_costs(
+            rows, evidence, ratio, new, self.detectable, self.states if states is None else states
+        )
         likely = np.flatnonzero(cost < 0)
         return likely[assignment.one_to_one(rows[likely], columns[likely], cost[likely])]
 
@@ -175,7 +188,7 @@ class TrackedPeople:
         self.measured[:] = False
         self.measured[rows] = True
         self.score[rows] = score
-        self.scale[:] = self._scale_of(self.bank[kalman.PLACE])
+        self.scale[:] = self.scale_of(self.bank[kalman.PLACE])
         if self.by_existence:
             existence.update(self.states, rows, self.detectable, np.exp(evidence), ratio)
             self.confirmed[:] = self.existence() >= kernels.LIKELY
@@ -218,25 +231,26 @@ class TrackedPeople:
         self.stand_cov[new] = np.diag([PLACE_SPREAD**2, PLACE_SPREAD**2, speed, speed, HEIGHT_SPREAD**2])
         self.measure_on_ground(new, box[new], self.noise)
 
-    def _scale_of(self, place: Array) -> Array:
+    def scale_of(self, place: Array) -> Array:
+        """Returns the scale (M,), px per m, of people with the boxes `place` (M, 4): centre x, y, height, width, px."""
         whole = self.px_per_m
         if self.top:
             return np.full(len(place), whole)
         size = np.maximum(place[:, 2], place[:, 3]) / PERSON_HEIGHT
         return np.asarray(np.minimum(np.maximum(size, whole / LARGEST_SCALE), whole * LARGEST_SCALE))
 
-    def new_people(self, z: Array, free: Bools, ratio: Array | float = 1.0) -> Array:
+    def new_people(self, z: Array, free: Bools, ratio: Array | float = 1.0, *, last: bool = True) -> Array:
         """Returns the probability (M,) that each box z (M, 4), as no track's, is of a person without a track.
 
         It may also be false, or a second box of a measured person or of an earlier one of the boxes `free` (M,), which
-        no track has. Also counts the people without a track.
+        no track has. last: also counts the people without a track, which must be done once a frame.
         """
         c, new, double = self.config, self._new_people() * (ratio * np.ones(len(z))), np.zeros(len(z))
         person = new / (new + c.clutter_rate)
         kernels.add_doubles(double, z, self.bank[kalman.PLACE], self.scale, self.existence() * self.measured, False)
-        kernels.add_doubles(double, z, z, self._scale_of(z), person * free, True)
+        kernels.add_doubles(double, z, z, self.scale_of(z), person * free, True)
         double *= c.clutter_rate * DOUBLES / (2 * np.pi * kernels.DOUBLE_SPREAD**2) ** 2 / self.false_density
-        if len(z) or len(self.id):
+        if last and (len(z) or len(self.id)):
             stay = np.exp(-self.dynamics.dt / existence.LIFETIME)
             self.unseen_time = stay * (1 - self.detect_prob) * self.unseen_time + self.dynamics.dt
         return np.asarray(new / (new + c.clutter_rate + double))
@@ -268,12 +282,14 @@ class TrackedPeople:
             return
         self._append(
             bank=kalman.born(z[:, :4], self.noise, self.dynamics.birth_rate_var),
-            id=np.arange(self.next_id, self.next_id + n), scale=self._scale_of(z), born=np.full(n, t), score=score,
+            id=np.arange(self.next_id, self.next_id + n), scale=self.scale_of(z), born=np.full(n, t), score=score,
             states=existence.newborn(person),
             confirmed=self.by_existence & (person >= kernels.LIKELY), measured=np.ones(n, bool),
         )  # fmt: skip
         if self.context.camera is not None:
             self._append(stand=np.full((n, 5), np.nan), stand_cov=np.full((n, 5, 5), np.nan))
+        if not self.by_existence:
+            self.rho = np.append(self.rho, np.full(n, self.birth_rho))
         self.next_id += n
 
     def _append(self, **new: Array | Ints | Bools) -> None:

@@ -1,4 +1,4 @@
-"""`blob`: people tracked from boxes or from pixels by a bank of Kalman filters with track management.
+"""`blob`: people tracked from boxes, from pixels or from both by a bank of Kalman filters with track management.
 
 Gonzalez, Rowe, Andrade, Villanueva, "Efficient management of multiple agent tracking through observation handling",
 2006. docs/trackers/blob.md has the state, the equations with their modules, and the departures.
@@ -23,21 +23,22 @@ if TYPE_CHECKING:
 
 
 class Blob:
-    """The tracker `blob`: people tracked from pixels if the context has a background sample, else from boxes.
+    """The tracker `blob`: people tracked from pixels if the context has a background sample, and from boxes.
 
     Made from a BlobConfig; None: the defaults. State: config, a BlobConfig, which may be replaced between two frames;
-    people, the table of tracks; updater, which updates the table from boxes or from pixels; context, of the sequence.
-    All but config exist after `reset` only.
+    people, the table of tracks; updater, which updates the table from boxes, or from pixels and boxes; context, of the
+    sequence. All but config exist after `reset` only.
     """
 
-    needs: ClassVar[tuple[str, ...]] = ("pixels", "boxes")
+    needs: ClassVar[tuple[str, ...]] = ("pixels", "boxes", "pixels and boxes")
     config_class: ClassVar[type[BlobConfig]] = BlobConfig
 
     def __init__(self, config: BlobConfig | None = None) -> None:
         self.config = config or BlobConfig()
 
     def reset(self, context: Context, seed: int) -> None:
-        """Deletes all tracks and starts a sequence, from pixels if the context has a background sample, else boxes.
+        """Deletes all tracks and starts a sequence, from pixels, and boxes if there are any, if the context has a
+        background sample, else from boxes alone.
 
         Ids begin at 1 again. `seed` is not used. If the image's size is unknown, it is taken from the background
         sample. From pixels, raises InputError if the sample has a wrong shape or dtype, too few frames or shows no
@@ -64,9 +65,9 @@ class Blob:
         """Returns the tracks to report after a frame, unit "person", each `group` -1; updates all tracks.
 
         They are boxes in the image (plane "image", px). With a camera they are on the ground (plane "ground", m) with
-        boxes, and a track above the horizon is left out. detections: used from boxes only; None is a frame without
-        measurement. From pixels a frame without image, or with too much foreground, is one. If `config` was replaced
-        since the last frame, all tracks go on with the new one.
+        boxes, and a track above the horizon is left out. detections: None is a frame at which no detector looked. A
+        frame without image, or with too much foreground, has no measurement from pixels. If `config` was replaced since
+        the last frame, all tracks go on with the new one.
 
         Raises InputError if the picture's size or dtype is not the background sample's, or if there are boxes and the
         scale px_per_m is unknown, zero or negative.

@@ -43,7 +43,7 @@ class BoxUpdater:
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
         """Updates the tracks with a frame's detections: predict, associate, update, confirm, delete, start."""
-        z, score = self._measurements(detections)
+        z, score = measured_boxes(detections)
         people = self.people
         if len(z):
             image_scale.required(people.px_per_m)
@@ -73,11 +73,14 @@ class BoxUpdater:
         height, width, px."""
         return self.people.upright_boxes()[rows]
 
-    def _measurements(self, detections: Detections | None) -> tuple[Array, Array]:
-        if detections is None or detections.box is None or not len(detections.box):
-            return np.zeros((0, 4)), np.zeros(0)
-        score = detections.score if len(detections.score) else np.ones(len(detections.box))
-        good = np.flatnonzero((detections.box[:, 2] > 0) & (detections.box[:, 3] > 0))
-        # of two boxes on one body the second is the one with the lower score, whatever their order in the file
-        order = good[np.lexsort((*detections.box[good].T, -score[good]))]
-        return box_geometry.centred_from_ltwh(detections.box[order]), score[order]
+
+def measured_boxes(detections: Detections | None) -> tuple[Array, Array]:
+    """Returns the boxes (M, 4), centre x, y, height, width, px, and their scores (M,), the highest first. Boxes without
+    an area are left out; None gives no box."""
+    if detections is None or detections.box is None or not len(detections.box):
+        return np.zeros((0, 4)), np.zeros(0)
+    score = detections.score if len(detections.score) else np.ones(len(detections.box))
+    good = np.flatnonzero((detections.box[:, 2] > 0) & (detections.box[:, 3] > 0))
+    # of two boxes on one body the second is the one with the lower score, whatever their order in the file
+    order = good[np.lexsort((*detections.box[good].T, -score[good]))]
+    return box_geometry.centred_from_ltwh(detections.box[order]), score[order]

@@ -2,6 +2,7 @@
 
 Order of a frame, with the paper's sections:
     predict all tracks                                                        sec. 4.2, eqs 1, 2
+    if a detector's boxes are given, too: associate, update, start tracks     ours (box_evidence)
     classify, clean, find blobs                                               secs. 3.2, 3.3 (detect.foreground)
     blobs of one person's size (without `split` all): gate, associate         secs. 4.3, 4.4, eqs 8 to 10
     other foreground: split among the tracks expected there, by templates     ours (person_template)
@@ -32,6 +33,7 @@ from tracking.detect.person_size import KEPT, PersonSize, upright
 from tracking.filters import kalman
 from tracking.papers.blob import box_geometry, person_look_kernels, person_template, person_template_search_kernels
 from tracking.papers.blob import person_template_kernels as kernels
+from tracking.papers.blob.box_evidence import BoxEvidence
 from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.ellipse_tracks import TrackedEllipses
 from tracking.papers.blob.person_look_kernels import LEARN_SHOWN, LOOK_TIME
@@ -77,8 +79,8 @@ class PixelUpdater:
     State: foreground, the pipeline with its background model; size, the size of a person at each place. It learns from
     every picture until KEPT people are remembered, then from the first one at or after `learn_at`, s. people, the table
     of tracks; config; gates, confirm_gates (2,): largest squared Mahalanobis distance d^2, without and with direction,
-    of an association and of a measurement that may confirm a track; upright_var: variance of the direction of an
-    upright template, rad^2, inf from straight above.
+    of an association and of a measurement that may confirm a track; boxes, the evidence of a detector; upright_var:
+    variance of the direction of an upright template, rad^2, inf from straight above.
     """
 
     def __init__(self, config: BlobConfig, people: TrackedEllipses, context: Context) -> None:
@@ -91,6 +93,7 @@ class PixelUpdater:
         self.size, self.learn_at = PersonSize(context), 0.0
         self.foreground = Foreground(context, config)
         self.foreground.learn_person_size(self.size, context.background)
+        self.boxes = BoxEvidence(people, self.size)
         self.upright_var = np.inf if self.size.above else np.radians(UPRIGHT) ** 2
         self.follow(config)
 
@@ -100,25 +103,32 @@ class PixelUpdater:
 
         self.config = config
         self.foreground.follow(config)
+        self.boxes.calibrate()
         # largest d^2 at these shares, for 4 degrees of freedom (no direction) and 5 (eq. 10)
         self.gates = chdtri(np.array([4, 5]), 1 - config.gate)
         self.confirm_gates = chdtri(np.array([4, 5]), 1 - CONFIRM_GATE)
 
     def step(self, frame: Frame, detections: Detections | None) -> None:
-        """Updates the tracks with a frame's picture (H, W, 3) BGR uint8; `detections` are not used."""
+        """Updates the tracks with a frame's picture (H, W, 3) BGR uint8 and with its boxes; each may be missing."""
         people, foreground = self.people, self.foreground
         people.px_per_m = foreground.scale
         seen = None if frame.image is None else foreground.segment(frame.image)
-        people.predict(observed=seen is not None and seen.plausible)
+        looked = seen is not None and seen.plausible
+        people.predict(observed=looked)
         people.widen_view(np.zeros((0, 4)))
+        boxed = np.zeros(0, np.int64)
+        if detections is not None:
+            boxed = self.boxes.measure(frame.t, detections, frame.image if looked else None, self.gates[0])
+            people.expect(looked * self.config.detect_prob)
         if seen is None or not seen.plausible:
             if seen is not None:
                 foreground.adapt(seen, self._protected())
             people.record_measured(np.zeros(0, np.int64), np.zeros(0, bool), np.zeros(0), np.zeros(0))
+            people.measured[boxed] = True
             people.delete_tracks(frame.t)
             return
         found = foreground.person_blobs(seen.mask)
-        self._measure(frame.t, seen, found)
+        self._measure(frame.t, seen, found, boxed)
         foreground.adapt(seen, self._protected())
         if len(found) and (frame.t >= self.learn_at or len(self.size.lone) < KEPT):
             self.learn_at = frame.t + SIZE_TIME
@@ -132,9 +142,10 @@ class PixelUpdater:
     def reported_boxes(self, rows: Ints) -> Array:
         """Returns the boxes (K, 4) that the tracker reports for the tracks at positions `rows` (K,): centre x, y,
         height, width, px."""
-        return self._person_boxes(self.people.upright_boxes()[rows])
+        boxes = self._person_boxes(self.people.upright_boxes()[rows])
+        return np.concatenate([boxes[:, :2], boxes[:, 2:] * np.sqrt(self.boxes.over_person)], 1)
 
-    def _measure(self, t: float, seen: Segmented, found: Blobs) -> None:
+    def _measure(self, t: float, seen: Segmented, found: Blobs, boxed: Ints) -> None:
         people = self.people
         expected = people.upright_boxes()
         split = self.config.split and self.size.reliable
@@ -142,6 +153,8 @@ class PixelUpdater:
         columns = lone.nonzero()[0]
         z, angle_var = found.ellipse[columns], found.angle_var[columns] + ANGLE_NOISE
         made, taken, gated = self._associate(z, angle_var)
+        if len(boxed):
+            self.boxes.learn(made.rows, self._person_boxes(upright(made.z[:, :4], made.z[:, 4])))
         unexplained = np.delete(z, taken if split else gated, 0)
         if split:
             cover = np.zeros(seen.mask.shape, np.int16)
@@ -163,6 +176,7 @@ class PixelUpdater:
             self._learn_looks(seen.image, made.rows)
         near = away <= self.confirm_gates[kalman.directed(made.angle_var).astype(int)]
         people.record_measured(made.rows, near, made.support, evidence)
+        people.measured[boxed] = True
         person = people.new_people(unexplained[:, :4].copy(), np.ones(len(unexplained), bool))
         people.delete_tracks(t)
         people.start_tracks(unexplained, np.ones(len(unexplained)), t, person)

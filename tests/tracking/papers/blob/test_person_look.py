@@ -43,6 +43,17 @@ def test_fits_are_the_slow_way(seed):
         assert np.allclose(got, slow.fits(image, cover, some, k, look, 2, 1.5), atol=1e-9)
 
 
+def test_fits_of_pairs_are_the_slow_way():
+    r, _, cover, some = scenery(3)
+    image = r.integers(0, 256, (HIGH, WIDE, 3)).astype(np.uint8)
+    seen = np.full((2, looks.POINTS, 1), 9.0)
+    look = np.concatenate([r.uniform(0, 255, (2, looks.POINTS, 3)), r.uniform(50, 9000, seen.shape), seen], 2)
+    rows, columns = np.array([1, 0, 1]), np.array([0, len(some) - 1, 1])
+    got = looks.pair_fits(image, some, look, rows, columns)
+    known = [slow.fits(image, 0 * cover, some, j, look[i], 0, 1.0)[0, 0] for i, j in zip(rows, columns, strict=True)]
+    assert got == pytest.approx(np.array(known), abs=1e-9)
+
+
 def test_what_is_learned_is_mean_and_variance_of_what_is_not_hidden():
     near, far = np.array([60.0, 84.0, 60.0, 24.0]), np.array([70.0, 80.0, 60.0, 24.0])
     both, found = np.stack([near, far]), looks.unknown(2)
