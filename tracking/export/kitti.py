@@ -8,9 +8,9 @@ times.txt, the time of each frame in s; and calib.txt of a pinhole camera. Pictu
 calib.txt has the matrices of KITTI's calibrations row by row, so that tools for its odometry and its object data read
 it. P0 to P3 (3 x 4) project points of the left camera's coordinates: there are no grey cameras, so P0 and P2 are the
 left picture, P1 and P3 the right one. The world takes the place of the laser scanner and of the IMU: Tr and
-Tr_velo_to_cam (3 x 4) map it to the left camera, Tr_imu_to_velo (3 x 4) and R0_rect (3 x 3) are identities. A camera
-that moves has no Tr and Tr_velo_to_cam, but poses.txt as KITTI's odometry: a line per frame, the 3 x 4 matrix that maps
-the left camera's coordinates to the world, row by row.
+Tr_velo_to_cam (3 x 4) map it to the left camera, Tr_imu_to_velo (3 x 4) and R0_rect (3 x 3) are identities. If the
+camera moves, all four are identities, and poses.txt has a line per frame, as in KITTI's odometry: the 3 x 4 matrix that
+maps the left camera's coordinates to the world, row by row.
 """
 
 from __future__ import annotations
@@ -57,17 +57,17 @@ def kitti(source: str | Path, out: str | Path) -> list[Path]:
 
 
 def calibration(camera: Camera, moves: bool = False) -> str:
-    """Returns the text of calib.txt for a rectified pair. camera: the left camera, with its baseline. moves: its place
-    is that of one frame only."""
+    """Returns the text of calib.txt for a rectified pair.
+
+    camera: the left camera, with its baseline. moves: True leaves its place out.
+    """
     (fx, fy), (cx, cy) = camera.focal_px, camera.centre_px
     left = np.array([[fx, 0, cx - 0.5, 0], [0, fy, cy - 0.5, 0], [0, 0, 1, 0]])  # KITTI: a pixel's centre is a whole px
     right = left.copy()
     right[0, 3] = -fx * camera.baseline
-    pose = np.column_stack([camera.rotation, -camera.rotation @ camera.position])
-    lines = {"P0": left, "P1": right, "P2": left, "P3": right, "R0_rect": np.eye(3)}
-    lines |= {} if moves else {"Tr_velo_to_cam": pose}
-    lines |= {"Tr_imu_to_velo": np.eye(3, 4)}
-    lines |= {} if moves else {"Tr": pose}
+    pose = np.eye(3, 4) if moves else np.column_stack([camera.rotation, -camera.rotation @ camera.position])
+    lines = {"P0": left, "P1": right, "P2": left, "P3": right, "R0_rect": np.eye(3), "Tr_velo_to_cam": pose}
+    lines |= {"Tr_imu_to_velo": np.eye(3, 4), "Tr": pose}
     return "".join(f"{name}: {_numbers(matrix)}\n" for name, matrix in lines.items())
 
 
