@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from sim.types import Array, Context, Ints
+from tracking.detect.camera_motion import mapped
 from tracking.detect.person_size import upright
 from tracking.filters import kalman, track_uncertainty
 from tracking.papers.blob import person_look_kernels
@@ -54,6 +55,10 @@ class TrackedEllipses(TrackedPeople):
         kalman.predict(self.nominal, self.dynamics.dt, self.q)
         self.angle[kalman.DIRECTION_VAR] += self.angle_var_per_step
         super().predict(observed)
+
+    def carry(self, step: Array) -> None:
+        """Moves all tracks in the image by a homography `step` (3, 3), as its reference follows the camera."""
+        self.bank[kalman.PLACE, :, :2] = mapped(step, self.bank[kalman.PLACE, :, :2])
 
     def compute_rho(self) -> Array:
         """Returns rho (N,) of all tracks: sqrt|S| over its asymptote, S the innovation covariance by the nominal

@@ -78,7 +78,12 @@ class Blob:
         camera, every = self.context.camera, np.arange(len(self.people.id))
         if camera is not None:
             self.people.place_on_ground(camera, self.updater.reported_boxes(every))
-        return self._report(frame)
+        found = self._report(frame)
+        return (
+            found
+            if self.context.background is None
+            else cast("PixelUpdater", self.updater).foreground.in_picture(found)
+        )
 
     def _report(self, frame: Frame) -> Tracks:
         people = self.people

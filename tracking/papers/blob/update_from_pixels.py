@@ -109,6 +109,9 @@ class PixelUpdater:
         people, foreground = self.people, self.foreground
         people.px_per_m = foreground.scale
         seen = None if frame.image is None else foreground.segment(frame.image)
+        step = foreground.take_step()
+        if step is not None:
+            people.carry(step)
         people.predict(observed=seen is not None and seen.plausible)
         people.widen_view(np.zeros((0, 4)))
         if seen is None or not seen.plausible:
