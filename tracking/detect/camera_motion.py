@@ -34,8 +34,8 @@ LARGEST_DIFFERENCE = 40.0  # grey levels: more counts as that much, as where peo
 STRETCH = 0.5, 2.0  # of the picture by a homography: others are mistakes
 KEY = 40.0  # px from one picture of a sample, on which others are laid, to the next
 LEAST_MOVED = 2  # fewest pictures of a sample that moved, beside a tenth of them
-SMOOTH_TIME = 1.0  # s over which movements are averaged, so that the reference follows a turn but no tremble
-FOLLOW = 8.0  # px of that average from which on the reference follows
+SMOOTH_TIME = 2.0  # s over which movements are averaged, so that the reference follows a turn but no tremble
+FOLLOW = 4.0  # px of that average from which on the reference follows
 DISTORTED = 16.0  # px: mean movement, beside a shift, from which on the reference is laid anew
 BLUR = 1.5  # px: of both pictures before they are compared
 

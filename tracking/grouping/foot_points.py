@@ -58,14 +58,14 @@ def _stand(tracks: Sequence[Tracks], source: str | None) -> bool:
 
 def ground_below(
     tracks: Sequence[Tracks], camera: Camera | None, px_per_m: float, source: str | None = None,
-    image_size: tuple[int, int] | None = None,
+    image_size: tuple[int, int] | None = None, moves: bool = False,
 ) -> Ground:  # fmt: skip
     """Returns the ground on which the boxes of tracks stand: by the camera if known, else by the first boxes.
 
-    source: as in `completed`. The boxes are used only if the tracker names no groups. The ground is unknown for tracks
-    that lack boxes, come from pictures, or lie on the ground.
+    source, moves: as in `completed`. The boxes are used only if the tracker names no groups. The ground is unknown for
+    tracks that lack boxes, come from pictures, or lie on the ground.
     """
-    if not _stand(tracks, source):
+    if moves or not _stand(tracks, source):
         return Ground()
     if camera is not None or names_groups(tracks):
         return Ground(camera)
@@ -75,16 +75,17 @@ def ground_below(
 def completed(
     tracks: Sequence[Tracks], fps: float, px_per_m: float, rule: Grouping | None = None, *, camera: Camera | None,
     scene: Scene | None, source: str | None = None, image_size: tuple[int, int] | None = None, objective: bool = False,
+    moves: bool = False,
 ) -> tuple[tuple[Tracks, ...], Ground]:  # fmt: skip
     """Returns the tracks with groups and events filled in, and the ground that was used for them.
 
     If the ground under the boxes is known (`ground_below`), groups are derived from positions there, else as
     `with_groups` does. source: what the tracker worked on, an `InputKind`; None: unknown. image_size: width, height,
-    px; None: unknown. objective: as of `derive`.
+    px; None: unknown. objective: as of `derive`. moves: the camera was found to move, so that the ground is unknown.
     """
     if all(t.derived for t in tracks):
         return tuple(tracks), Ground()
-    ground = ground_below(tracks, camera, px_per_m, source, image_size)
+    ground = ground_below(tracks, camera, px_per_m, source, image_size, moves)
     if ground.camera is None:
         return with_groups(tracks, fps, px_per_m, rule, objective=objective), ground
     places = _places(tracks, ground, scene)

@@ -139,6 +139,7 @@ def track(
     tracks, ground = completed(
         reported, sequence.fps, scale.px_per_m, rule, camera=known.camera, scene=known.scene,
         source=prepared.input, image_size=known.image_size,
+        moves=bool(getattr(prepared.tracker, "camera_moves", False)),
     )  # fmt: skip
     named, late, odd = names_groups(reported), late_groups(reported), list[str]()
     if named and chosen is not None:

@@ -85,6 +85,11 @@ class Blob:
             else cast("PixelUpdater", self.updater).foreground.in_picture(found)
         )
 
+    @property
+    def camera_moves(self) -> bool:
+        """True if the camera was found to move, so that a place in the picture is no place on the ground."""
+        return self.updater.camera_moves
+
     def _report(self, frame: Frame) -> Tracks:
         people = self.people
         rows = people.rows_to_report()

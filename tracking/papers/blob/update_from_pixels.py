@@ -132,6 +132,11 @@ class PixelUpdater:
         boxes = self._person_boxes(self.people.upright_boxes()[self.people.confirmed])
         return person_template.template_mask(self.foreground.shape, box_geometry.standing(boxes))
 
+    @property
+    def camera_moves(self) -> bool:
+        """True if the camera was found to move."""
+        return self.foreground.stabiliser is not None
+
     def reported_boxes(self, rows: Ints) -> Array:
         """Returns the boxes (K, 4) that the tracker reports for the tracks at positions `rows` (K,): centre x, y,
         height, width, px."""
