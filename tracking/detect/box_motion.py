@@ -45,9 +45,7 @@ class BoxMotion:
         found = shared_difference(self._boxes, boxes)
         self._boxes, (before, error) = boxes, self._last
         self._last = (np.zeros(2), np.inf) if found is None else found
-        if found is None:
-            return None
-        if not self.moves:
+        if not self.moves and found is not None:
             both = float(np.hypot(error, found[1]))
             jump, size = float(np.linalg.norm(found[0] - before)), float(np.linalg.norm(found[0]))
             jumps = jump > max(ACCELERATION / self._fps**2 * px_per_m, ERRORS * both)
@@ -56,8 +54,8 @@ class BoxMotion:
             self.moves = len(self.signs) >= LEAST_SIGNS
         if not self.moves:
             return None
-        of_tracks = shared_difference(predicted, boxes)
-        return found[0] if of_tracks is None else of_tracks[0]
+        shared = shared_difference(predicted, boxes) or found
+        return None if shared is None else shared[0]
 
 
 def shared_difference(first: Array, second: Array) -> tuple[Array, float] | None:

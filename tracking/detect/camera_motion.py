@@ -30,12 +30,13 @@ LEAST_INLIERS, LEAST_SHARE = 12, 0.4  # corners that agree, in number and as a s
 LEAST_CELLS = 0.3  # share of the cells with corners in which some agree
 MOVED = 1.5  # px: mean movement of the picture from which on the camera moves
 BETTER = 0.8  # the difference from the model must fall to this share
+LEAST_BETTER = 0.25  # in at least this share of the cells, as people who all walk one way cover fewer
 LARGEST_DIFFERENCE = 40.0  # grey levels: more counts as that much, as where people are
 STRETCH = 0.5, 2.0  # of the picture by a homography: others are mistakes
 KEY = 40.0  # px from one picture of a sample, on which others are laid, to the next
 LEAST_MOVED = 2  # fewest pictures of a sample that moved, beside a tenth of them
-SMOOTH_TIME = 2.0  # s over which movements are averaged, so that the reference follows a turn but no tremble
-FOLLOW = 4.0  # px of that average from which on the reference follows
+SMOOTH_TIME = 1.0  # s over which movements are averaged, so that the reference follows a turn but no tremble
+FOLLOW = 8.0  # px of that average from which on the reference follows
 DISTORTED = 16.0  # px: mean movement, beside a shift, from which on the reference is laid anew
 BLUR = 1.5  # px: of both pictures before they are compared
 
@@ -136,10 +137,13 @@ def explains(corners: Corners, picture: Image, transform: Array, before: Array) 
         there = cv2.warpPerspective(other, one, corners.size, flags=cv2.INTER_LINEAR, borderValue=-1e4)
         off.append(np.abs(there - own))
     both = (off[0] < 1e3) & (off[1] < 1e3)
-    if not both.any():
-        return False
-    first, second = (float(np.minimum(each[both], LARGEST_DIFFERENCE).mean()) for each in off)
-    return second < BETTER * first
+    first, second = (cells_of(np.where(both, np.minimum(each, LARGEST_DIFFERENCE), 0.0)) for each in off)
+    return bool(second.sum() < BETTER * first.sum() and (second < BETTER * first).mean() >= LEAST_BETTER)
+
+
+def cells_of(values: NDArray[np.float32]) -> Array:
+    """Returns the mean of values (H, W) in each cell of the grid, (GRID[1], GRID[0])."""
+    return np.asarray(cv2.resize(values.astype(np.float32), GRID, interpolation=cv2.INTER_AREA), float)
 
 
 def poses_of_sample(sample: Image) -> list[Array | None] | None:
@@ -210,8 +214,8 @@ class Stabiliser:
     """Lays each picture on a reference picture, which follows the camera in whole steps.
 
     State: size, width and height, px; pose (3, 3), the homography of the last picture to the reference; corners of the
-    reference; poses of the background sample, at which a lost picture is looked for; smooth (2,), px, the mean of the
-    last poses' movements of the middle, by which the reference follows; lost, the pictures in a row that could not be
+    reference; poses of the background sample, at which a lost picture is looked for; means (2, 2), px, the mean of the
+    last movements of the middle, and the mean of that mean; lost, the pictures in a row that could not be
     laid.
     """
 
@@ -219,7 +223,7 @@ class Stabiliser:
         self, reference: Image, known: Bools | None, fps: float, poses: list[Array | None] | None = None
     ) -> None:
         self.size = reference.shape[1], reference.shape[0]
-        self.pose, self.lost, self.smooth = np.eye(3), 0, np.zeros(2)
+        self.pose, self.lost, self.means = np.eye(3), 0, np.zeros((2, 2))
         self._keep = float(np.exp(-1.0 / (SMOOTH_TIME * fps)))
         self.poses = [] if poses is None else [one for one in poses if one is not None][:: max(len(poses) // 6, 1)]
         self.look_at(reference, known)
@@ -238,7 +242,7 @@ class Stabiliser:
     def lay(self, image: Image) -> Laid | None:
         """Returns a picture (H, W, 3) laid on the reference; None if it cannot be."""
         picture, found = grey(image), None
-        for guess in (self.pose, *(self.poses if self.lost or not self.smooth.any() else ())):
+        for guess in (self.pose, *(self.poses if self.lost or not self.means.any() else ())):
             found = laid_on(self.corners, picture, guess)
             if found is not None:
                 break
@@ -247,18 +251,21 @@ class Stabiliser:
             return None
         self.pose, self.lost = found, 0
         middle = np.array(self.size) / 2
-        self.smooth = self._keep * self.smooth + (1 - self._keep) * (mapped(found, middle) - middle)
+        for mean, value in ((0, mapped(found, middle) - middle), (1, self.means[0])):
+            self.means[mean] = self._keep * self.means[mean] + (1 - self._keep) * value
         return self.laid_again(image)
 
     def step(self) -> Array | None:
         """Returns the homography (3, 3) by which the reference should move now, so that it follows the camera; None if
         it stays. Whole px where the picture is hardly distorted; `moved_by` tells that it was done."""
-        middle = np.array(self.size) / 2
-        away = mapped(self.pose, middle) - middle
-        if np.abs(self.smooth).max() <= FOLLOW:
+        # Without the lag of a mean, if the movement is steady.
+        way = 2 * self.means[0] - self.means[1]
+        if np.abs(way).max() <= FOLLOW:
             return None
-        whole = shifted(*(-np.rint(away)))
-        return whole if movement(whole @ self.pose, self.size) < DISTORTED else np.linalg.inv(self.pose)
+        whole, middle = shifted(*(-np.rint(way))), np.array(self.size) / 2
+        away = mapped(self.pose, middle) - middle
+        distorted = movement(shifted(*(-away)) @ self.pose, self.size) >= DISTORTED
+        return shifted(*(away - way)) @ np.linalg.inv(self.pose) if distorted else whole
 
     def laid_again(self, image: Image) -> Laid:
         """Returns the picture of the last `lay` as it lies on the reference now."""
@@ -268,7 +275,7 @@ class Stabiliser:
     def moved_by(self, step: Array) -> None:
         """Takes the reference's movement: poses are those of the new one."""
         middle = np.array(self.size) / 2
-        self.smooth = mapped(step, middle + self.smooth) - middle
+        self.means = mapped(step, middle + self.means) - middle
         self.pose = step @ self.pose
         self.poses = [step @ one for one in self.poses]
 
