@@ -52,6 +52,11 @@ def mapped(transform: Array, points: Array) -> Array:
     return np.asarray(moved[..., :2] / moved[..., 2:])
 
 
+def inverse(transform: Array) -> Array:
+    """Returns the homography (3, 3) back."""
+    return np.asarray(np.linalg.inv(transform), np.float64)
+
+
 def shifted(right: float, down: float) -> Array:
     """Returns the homography (3, 3) that moves points to the right and down, px."""
     return np.array([[1.0, 0.0, right], [0.0, 1.0, down], [0.0, 0.0, 1.0]])
@@ -94,7 +99,7 @@ def corners_of(picture: Image, known: Bools | None = None) -> Corners:
             inside = None if mask is None else mask[part]
             one = cv2.goodFeaturesToTrack(np.ascontiguousarray(picture[part]), PER_CELL, QUALITY, APART, mask=inside)
             if one is not None:
-                found.append(one[:, 0] + np.array([across[column], down[row]], np.float32))
+                found.append(np.asarray(one[:, 0] + (across[column], down[row]), np.float32))
                 cells.append(np.full(len(one), row * GRID[0] + column))
     return Corners(picture, np.concatenate(found), np.concatenate(cells))
 
@@ -106,7 +111,7 @@ def laid_on(corners: Corners, picture: Image, guess: Array) -> Array | None:
     """
     if len(corners.at) < LEAST_INLIERS:
         return None
-    start = mapped(np.linalg.inv(guess), corners.at.astype(float)).astype(np.float32)
+    start = mapped(inverse(guess), corners.at.astype(np.float64)).astype(np.float32)
     seen, status, _ = cv2.calcOpticalFlowPyrLK(
         corners.grey, picture, corners.at[:, None], start[:, None].copy(), winSize=WINDOW, maxLevel=LEVELS,
         flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
@@ -186,7 +191,7 @@ def on_one_picture(sample: Image, poses: list[Array | None]) -> tuple[Image, Boo
         for p, h in zip(sample, poses, strict=True)
         if h is not None
     ]
-    pictures, shown = np.stack([p for p, _ in laid]), np.stack([s for _, s in laid])
+    pictures, shown = np.stack([p for p, _ in laid]).astype(np.uint8), np.stack([s for _, s in laid])
     for order in (range(1, len(laid)), range(len(laid) - 2, -1, -1)):
         for k in order:
             other = k - 1 if order.step > 0 else k + 1
@@ -236,8 +241,9 @@ class Stabiliser:
         """Returns True if the camera has moved from the reference, by one picture (H, W, 3)."""
         picture = grey(image)
         found = laid_on(self.corners, picture, np.eye(3))
-        moved = found is not None and movement(found, self.size) >= MOVED
-        return moved and explains(self.corners, picture, found, np.eye(3))
+        if found is None or movement(found, self.size) < MOVED:
+            return False
+        return explains(self.corners, picture, found, np.eye(3))
 
     def lay(self, image: Image) -> Laid | None:
         """Returns a picture (H, W, 3) laid on the reference; None if it cannot be."""
@@ -265,7 +271,7 @@ class Stabiliser:
         whole, middle = shifted(*(-np.rint(way))), np.array(self.size) / 2
         away = mapped(self.pose, middle) - middle
         distorted = movement(shifted(*(-away)) @ self.pose, self.size) >= DISTORTED
-        return shifted(*(away - way)) @ np.linalg.inv(self.pose) if distorted else whole
+        return shifted(*(away - way)) @ inverse(self.pose) if distorted else whole
 
     def laid_again(self, image: Image) -> Laid:
         """Returns the picture of the last `lay` as it lies on the reference now."""
@@ -286,7 +292,7 @@ def in_picture(tracks: Tracks, pose: Array) -> Tracks:
     Positions, boxes and hulls are those in the picture. Velocities and covariances stay those beside the reference, so
     that they are of the people and not of the camera. On the ground only boxes are in the picture.
     """
-    back = np.linalg.inv(pose)
+    back = inverse(pose)
     box = None if tracks.box is None else boxes_after(back, tracks.box)
     if tracks.plane != "image":
         return tracks.replace(box=box)
