@@ -17,15 +17,16 @@ from sim.looks import with_looks
 from sim.rng import look_seed
 from sim.scene.boxes import check_nobody_in_boxes
 from sim.scene.camera import px_per_m_at_centre
-from sim.scene.camera_placement import place_camera
+from sim.scene.camera_motion import cameras_of_frames, place_view
 from sim.streams import check_streams
-from sim.truth.label import bodies, label
+from sim.truth.label import bodies, events_in_view, in_view, label
 from sim.truth.order_fulfilment import check_orders
 
 # isort: off
 # fmt: off
 from sim.types import (
-    BACKGROUNDS, OWN_BACKGROUND, Array, Detections, Frame, FrameTruth, Image, Ints, Motion, PixelTruth, Sequence, Truth,
+    BACKGROUNDS, OWN_BACKGROUND, Array, Camera, Detections, Frame, FrameTruth, Image, Ints, Motion, PixelTruth,
+    Sequence, Truth,
 )
 # fmt: on
 # isort: on
@@ -93,13 +94,14 @@ def observe(
     check_stride(stride, motion.fps)
     check_nobody_in_boxes(motion)
     motion = with_looks(motion, scenario.looks)
-    camera = place_camera(scenario.camera, motion)
+    view = place_view(scenario.camera, motion)
+    camera = view if isinstance(view, Camera) else None
     wanted = frozenset(check_streams(streams, "png"))
     renderer: Renderer | None = None
     if wanted:
         from sim.render import renderer as drawing
 
-        renderer = drawing.Renderer(motion, camera, scenario.light, scenario.picture)
+        renderer = drawing.Renderer(motion, view, scenario.light, scenario.picture)
     if renderer is not None and not wanted.isdisjoint({"right", "disparity"}):
         renderer.check_pair()
     left, right, disparity = ("left" in wanted, "right" in wanted, "disparity" in wanted)
@@ -117,12 +119,16 @@ def observe(
         return named_people(scenario, motion.scene, motion.seed, motion.repeat, motion.orders)
 
     @cache
+    def seen() -> Truth:
+        return bodies(motion, view)
+
+    @cache
     def sensed() -> tuple[list[Detections], list[Ints]]:
         from sim.detector.sense import sense_owned
 
         hidden = named() if any(hide.group is not None for hide in scenario.sensor.hide) else {}
-        seen = bodies(motion, camera)
-        found, owners = sense_owned(seen, scenario.sensor, motion.seed, camera, camera.image, motion.repeat, hidden)
+        size = scenario.camera.image
+        found, owners = sense_owned(seen(), scenario.sensor, motion.seed, view, size, motion.repeat, hidden)
         return [d.replace(index=k + 1, t=k / kept.fps) for k, d in enumerate(found[::stride])], owners[::stride]
 
     def bare() -> Iterator[Frame]:
@@ -139,8 +145,13 @@ def observe(
 
     def pixels(index: int) -> PixelTruth:
         assert renderer is not None
-        known = shown(index).pixels if labels else None
-        return renderer.pixels(1 + (index - 1) * stride, disparity=disparity) if known is None else known
+        shot, known = 1 + (index - 1) * stride, shown(index).pixels if labels else None
+        known = renderer.pixels(shot, disparity=disparity) if known is None else known
+        if camera is not None:
+            return known
+        # As in the truth: without people who are out of view.
+        inside, columns = in_view(seen())[seen().rows(shot)], ("visible_px", "amodal_px", "box", "blob")
+        return known.replace(**{name: getattr(known, name)[inside] for name in columns})
 
     def background() -> Image:
         assert renderer is not None
@@ -159,20 +170,25 @@ def observe(
         )
 
     def truth() -> Truth:
-        found = label(kept, camera)
+        found = label(kept, view)
         if check:
             check_orders(kept, found)
-        return found
+        return found if camera is not None else events_in_view(found)
+
+    def cameras() -> tuple[Camera, ...]:
+        return cameras_of_frames(view, kept.fps, len(kept.present))
 
     source = {"kind": "simulated", "seed": motion.seed, "repeat": motion.repeat}
     source |= {} if stride == 1 else {"stride": stride}
     source |= {} if renderer is None else {"background": OWN_BACKGROUND}
     return LabelledSequence(
         name=motion.name, fps=kept.fps, length=len(kept.present), frames=bare if renderer is None else frames,
-        load_truth=truth, image_size=camera.image, camera=camera, scene=motion.scene,
-        px_per_m=px_per_m_at_centre(camera), has_images=left, has_right=right, has_detections=True,
+        load_truth=truth, image_size=scenario.camera.image, camera=camera, scene=motion.scene,
+        px_per_m=float("nan") if camera is None else px_per_m_at_centre(camera),
+        has_images=left, has_right=right, has_detections=True,
         load_people=named, source=source, bare=bare,
         load_owners=lambda: sensed()[1],
         load_background=None if renderer is None else background, load_pixels=None if renderer is None else pixels,
-        load_light=light, never_arrive=motion.never_arrive, immobile=motion.immobile,
+        load_light=light, load_cameras=None if camera is not None else cameras,
+        never_arrive=motion.never_arrive, immobile=motion.immobile,
     )  # fmt: skip

@@ -421,8 +421,8 @@ class Sequence:
     pictures (K, H, W, 3) of a scene to train a background model; load_people() the person ids of each group that the
     script names; load_owners() for each frame the ids (M,) of the people whom its detections show, -1 for false alarms;
     load_pixels(index) the PixelTruth of frame `index`; load_light() the factor of brightness of each frame, (length,),
-    without clouds. source: where it comes from ("kind", "path", "seed", …). never_arrive: groups of a simulated crowd
-    that do not reach their goal."""
+    without clouds; load_cameras() the Camera of each frame if it moves, as `camera` is None then. source: where it
+    comes from ("kind", "path", "seed", …). never_arrive: groups of a simulated crowd that do not reach their goal."""
 
     name: str
     fps: float
@@ -443,6 +443,7 @@ class Sequence:
     bare: Callable[[], Iterator[Frame]] | None = None
     load_pixels: Callable[[int], PixelTruth] | None = None
     load_light: Callable[[], Array] | None = None
+    load_cameras: Callable[[], tuple[Camera, ...]] | None = None
     never_arrive: tuple[NeverArrives, ...] = ()
     immobile: tuple[Immobile, ...] = ()
 

@@ -55,7 +55,8 @@ def _keys(table: dict[str, Any], known: dict[str, Any], prefix: str) -> Iterator
         many = "[]" if any("items" in each for each in (node, *node.get("anyOf", ()))) else ""
         tables = list(_tables(node, known))
         for inner in tables:
-            which = f"({inner['properties']['type']['const']})" if len(tables) > 1 else ""
+            kind = inner["properties"].get("type") or inner["properties"].get("kind", {})
+            which = f"({kind['const']})" if len(tables) > 1 else ""
             yield from _keys(inner, known, f"{prefix}{name}{many}{which}.")
         if not tables:
             default = "required" if name in required else _default(node)

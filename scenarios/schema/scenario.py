@@ -11,6 +11,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 from pydantic.json_schema import SkipJsonSchema
 
 from scenarios.limits import FRAME_RATES, PICTURE_SIZES, fits_picture
+from scenarios.schema.camera_motion import CameraMotion
 from scenarios.schema.groups import FASTEST, AtGoal, GroupSpec, Height, Seconds, Speed
 from scenarios.schema.looks import LooksSpec
 from scenarios.schema.pictures import Light, Picture
@@ -56,7 +57,8 @@ class CameraSpec(Model):
         px_per_m: scale, px per m (kind top); absent: chosen so that all people are in view
         height: height above the ground, m; absent: chosen so that all people are in view
         position: x, y of the camera, m; absent: chosen so that all people are in view
-        crop: true accepts people who walk out of view; false makes that an error
+        crop: true accepts people who walk out of view; false makes that an error (of a moving camera: at its rest)
+        motion: how the camera moves while it records (kind pinhole); absent: it stands still
     """
 
     kind: Literal["pinhole", "top"] = "pinhole"
@@ -70,6 +72,7 @@ class CameraSpec(Model):
     height: Positive | None = None
     position: FixedPoint | None = None
     crop: bool = False
+    motion: CameraMotion | None = None
 
 
 class CrowdSpec(Model):

@@ -23,11 +23,12 @@ import numpy as np
 
 from sim.detector.box_noise import move_edges
 from sim.detector.draws import CLOCK, Readings, false_scores, ticks
-from sim.detector.visible_ground import VisibleGround, clip_boxes, furthest_row, labelled_points
+from sim.detector.visible_ground import GroundInView, VisibleGround, clip_boxes, furthest_row, labelled_points
 from sim.elementary import exp, log
 from sim.rng import normals, poisson_quantiles, rng, uniforms
 from sim.scene.body import PERSON_HEIGHT, SHOULDER_SHARE, person_boxes
 from sim.scene.camera import standing_share, to_ground
+from sim.scene.camera_motion import MovingCamera, View, by_frame, camera_at
 from sim.types import Array, Bools, Camera, Ints, Truth
 
 if TYPE_CHECKING:
@@ -40,7 +41,7 @@ SITE_SPREAD = 0.03  # standard deviation of positions round the sites `at`, as a
 
 
 def persistent_false_alarms(
-    truth: Truth, sensor: Sensor, seed: int, camera: Camera | None, size: Array | None, repeat: int
+    truth: Truth, sensor: Sensor, seed: int, camera: View | None, size: Array | None, repeat: int
 ) -> Readings:
     """Returns the false alarms of all frames 1 to truth.length as Readings, where alarms last several frames.
 
@@ -55,10 +56,10 @@ def persistent_false_alarms(
     """
     model = sensor.false_alarms
     assert model is not None
-    ground = VisibleGround(truth, camera, size)
+    view = GroundInView(truth, camera, size)
     none = np.zeros(0, np.int64), np.zeros((0, 4)), np.zeros((0, 2)), np.zeros((0, FRAME_DRAWS))
     born = _draw_births(model, sensor.clutter_rate, truth, seed, repeat)
-    parts = [none, *(_one_alarm(model, ground, *birth, seed, repeat) for birth in born)]
+    parts = [none, *(_one_alarm(model, view, *birth, seed, repeat) for birth in born)]
     frame, box, pos, u = (np.concatenate(part) for part in zip(*parts, strict=True))
     keep = u[:, SHOWN] < model.seen
     if truth.box is not None:
@@ -102,7 +103,7 @@ def _draw_births(
 
 
 def _one_alarm(
-    model: FalseAlarms, ground: VisibleGround, start: int, age: float, name: tuple[int, int], at_birth: Array,
+    model: FalseAlarms, view: GroundInView, start: int, age: float, name: tuple[int, int], at_birth: Array,
     in_frames: Array, seed: int, repeat: int,
 ) -> tuple[Ints, Array, Array, Array]:  # fmt: skip
     """Returns one alarm, as of `_draw_births`: its frames (L,), boxes (L, 4) px, points (L, 2) m and uniforms (L, 7).
@@ -111,17 +112,20 @@ def _one_alarm(
     person is first absent. Otherwise, or without people in that frame, it is on its own. `model.jitter`: standard
     deviation of the random error of each edge in each frame, in box heights.
     """
-    frame = start + np.arange(len(in_frames))
+    frame, truth = start + np.arange(len(in_frames)), view.truth
     n = normals(at_birth)
-    here = ground.truth.rows(start)
+    here = truth.rows(start)
     if at_birth[AT_PERSON] < model.near and here.stop > here.start:
-        id = _draw_person(ground.truth.id[here], seed, name, repeat)
-        row, present = _rows_of_person(ground.truth, id, frame)
+        id = _draw_person(truth.id[here], seed, name, repeat)
+        row, present = _rows_of_person(truth, id, frame)
         frame, in_frames = frame[present], in_frames[present]
-        box, pos = _boxes_at_person(model, ground, row, n)
+        parts = [_boxes_at_person(model, ground, row[r], n) for ground, r in view.by_frame(frame)]
+        box, pos = (np.concatenate(part) for part in zip(*parts, strict=True))
     else:
-        ages = age + np.arange(len(in_frames)) / ground.truth.fps
-        box, pos = _boxes_alone(model, ground, ages, at_birth, n)
+        ages = age + np.arange(len(in_frames)) / truth.fps
+        box, pos = _boxes_alone(model, view.in_frame(start), ages, at_birth, n)
+        if view.moves:
+            box = view.carried(frame, box, pos)
     if model.jitter:
         box = move_edges(box, model.jitter * box[:, 3:] * normals(in_frames[:, EDGES]))
     return frame, box, pos, in_frames
@@ -217,7 +221,7 @@ ACROSS, DOWN, HEIGHT, HEADING, SCORE_1, ORDER_1, DRAWS = 0, 1, 2, 3, 4, 5, 6  # 
 
 
 def false_alarms(
-    truth: Truth, sensor: Sensor, seed: int, camera: Camera | None, image_size: tuple[int, int] | None, repeat: int = 0,
+    truth: Truth, sensor: Sensor, seed: int, camera: View | None, image_size: tuple[int, int] | None, repeat: int = 0,
 ) -> Readings:  # fmt: skip
     """Returns the false alarms of all frames 1 to truth.length as Readings; their number per frame is Poisson.
 
@@ -232,7 +236,7 @@ def false_alarms(
     even without area. Without a camera and without labels there are no false alarms. seed, repeat (number of the suite
     entry's copy, 0 without copies): name the random streams. Raises ValueError for a negative seed.
     """
-    size = camera.image if camera is not None else image_size
+    size = camera_at(camera, 0.0).image if camera is not None else image_size
     if sensor.false_alarms is not None and (len(truth.id) or camera is not None):
         known = None if size is None else np.array(size, dtype=float)
         return persistent_false_alarms(truth, sensor, seed, camera, known, repeat)
@@ -243,7 +247,11 @@ def false_alarms(
             here = np.flatnonzero(count > k)
             drawn = uniforms(rng(seed, "clutter", 1 + k, repeat=repeat), (truth.length, DRAWS))
             frame, u = np.append(frame, here + 1), np.concatenate([u, drawn[here]])
-    pos, box = _placed_by_camera(camera, u) if camera is not None else _placed_by_labels(truth, image_size, u)
+    order = np.argsort(frame, kind="stable") if isinstance(camera, MovingCamera) else np.arange(len(frame))
+    frame, u = frame[order], u[order]
+    pos, box = (
+        _placed_by_labels(truth, image_size, u) if camera is None else _placed_by_view(camera, frame, u, truth.fps)
+    )
     if box is not None and size is not None and sensor.box == "visible":
         box = clip_boxes(box, size)
     if truth.pos is None and box is not None:
@@ -258,6 +266,12 @@ def false_alarm_counts(rate: float, length: int, seed: int, repeat: int = 0) -> 
     higher rate never gives a smaller number. All are 0 if the rate is 0. Raises ValueError for a negative seed or rate.
     """
     return poisson_quantiles(rate, uniforms(rng(seed, "clutter", 0, repeat=repeat), length))
+
+
+def _placed_by_view(view: View, frame: Ints, u: Array, fps: float) -> tuple[Array, Array]:
+    parts = [_placed_by_camera(camera, u[r]) for camera, r in by_frame(view, frame, fps)]
+    pos, box = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return pos, box
 
 
 def _placed_by_camera(camera: Camera, u: Array) -> tuple[Array, Array]:

@@ -28,6 +28,7 @@ from sim.elementary import normal_quantile, power
 from sim.rng import normals, rng, uniforms
 from sim.scene.body import SHOULDER_SHARE
 from sim.scene.camera import foot_points
+from sim.scene.camera_motion import View, by_frame
 from sim.types import Array, Bools, Camera, Detections, Ints, Truth
 
 if TYPE_CHECKING:
@@ -39,7 +40,7 @@ PERSISTENCE_STEP = 0.1  # s: lag of which `sensor.persistence` is the correlatio
 
 
 def sense(
-    truth: Truth, sensor: Sensor, seed: int, camera: Camera | None = None, image_size: tuple[int, int] | None = None,
+    truth: Truth, sensor: Sensor, seed: int, camera: View | None = None, image_size: tuple[int, int] | None = None,
     repeat: int = 0, people: Mapping[str, tuple[int, ...]] | None = None,
 ) -> list[Detections]:  # fmt: skip
     """Returns one Detections for each of the frames 1 to truth.length, with the false alarms of the detector.
@@ -61,7 +62,7 @@ def sense(
 
 
 def sense_owned(
-    truth: Truth, sensor: Sensor, seed: int, camera: Camera | None = None, image_size: tuple[int, int] | None = None,
+    truth: Truth, sensor: Sensor, seed: int, camera: View | None = None, image_size: tuple[int, int] | None = None,
     repeat: int = 0, people: Mapping[str, tuple[int, ...]] | None = None,
 ) -> tuple[list[Detections], list[Ints]]:  # fmt: skip
     """Returns the detections of `sense`, and for each frame the ids (M,) of the people whom they show, -1 for a false
@@ -72,7 +73,7 @@ def sense_owned(
 
 
 def _true_detections(
-    truth: Truth, sensor: Sensor, seed: int, repeat: int, people: Mapping[str, tuple[int, ...]], camera: Camera | None
+    truth: Truth, sensor: Sensor, seed: int, repeat: int, people: Mapping[str, tuple[int, ...]], camera: View | None
 ) -> Readings:
     n, u = person_draws(truth, seed, repeat, sensor)
     hidden = _artificially_hidden(truth, sensor, people)
@@ -95,9 +96,7 @@ def _true_detections(
     return Readings(truth.frame[seen], pos, box, score, u[:, ORDER], truth.id[seen])
 
 
-def _displaced(
-    pos: Array, sensed: Array, box: Array, truth: Truth, seen: Bools, sensor: Sensor, camera: Camera
-) -> Array:
+def _displaced(pos: Array, sensed: Array, box: Array, truth: Truth, seen: Bools, sensor: Sensor, camera: View) -> Array:
     """Returns the points (N, 2) in m that the detector reports, by `sensor.points`, of points with errors pos (N, 2).
 
     "own": pos itself. "seen": pos displaced as the foot of the person's sensed box is. "foot": the place on the ground
@@ -108,9 +107,11 @@ def _displaced(
     if sensor.points == "own" or truth.box is None:
         return pos
     z = np.zeros(len(box)) if truth.z is None else truth.z[seen]
+    whole, views = truth.box[seen], list(by_frame(camera, truth.frame[seen], truth.fps))
     if sensor.points == "seen":
-        return pos + seen_shift(sensed, truth.box[seen], z, camera)
-    at = foot_points(box, z, camera)
+        shifts = [seen_shift(sensed[r], whole[r], z[r], one) for one, r in views]
+        return pos + np.concatenate([np.zeros((0, 2)), *shifts])
+    at = np.concatenate([foot_points(box[r], z[r], one) for one, r in views])
     return np.where(np.isfinite(at), at, pos)
 
 
@@ -160,7 +161,7 @@ def _kept(persistence: float, count: int, r: np.random.Generator) -> Array:
     return normals(drawn[:, 1])[np.maximum.accumulate(np.where(fresh, np.arange(count), 0))]
 
 
-def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = None) -> Array:
+def detection_probability(truth: Truth, sensor: Sensor, camera: View | None = None) -> Array:
     """Returns the probability (R,), 0 to 1, that each row of the truth is detected; `sensor.hide` is not considered.
 
     It is detect_prob times the factor of visibility times min(1, size / (2 small_px)), and 0 where the visibility is
@@ -174,7 +175,7 @@ def detection_probability(truth: Truth, sensor: Sensor, camera: Camera | None = 
     factor = power(visible, sensor.occlusion_power) if curve is None else draws.interpolated_quantiles(curve, visible)
     p = sensor.detect_prob * factor
     if sensor.small_px and truth.box is not None:
-        from_above = camera is not None and camera.kind == "top"
+        from_above = isinstance(camera, Camera) and camera.kind == "top"
         size = truth.box[:, 2:].max(axis=1) / SHOULDER_SHARE if from_above else truth.box[:, 3]
         p = p * np.minimum(1.0, np.nan_to_num(size) / (2 * sensor.small_px))
     return np.asarray(np.where(visible >= sensor.min_visibility, p, 0.0))

@@ -5,12 +5,15 @@ Both come from the camera, or from the labelled boxes if the camera is unknown. 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from sim.elementary import length
 from sim.scene.body import PERSON_HEIGHT, person_boxes
 from sim.scene.camera import project, to_ground
-from sim.types import Array, Camera, Truth
+from sim.scene.camera_motion import MovingCamera, View, camera_at
+from sim.types import Array, Camera, Ints, Truth
 
 SMALLEST = 0.25  # ground ends where people are smaller than this share of a person in the middle of the image
 
@@ -86,6 +89,51 @@ class VisibleGround:
         top = -np.inf if self.camera.kind == "top" else self.low[1]
         pos = to_ground(self.camera, np.stack([u, np.maximum(v, top)], axis=1))
         return np.where(np.isfinite(pos), pos, otherwise)
+
+
+class GroundInView:
+    """The `VisibleGround` of each frame: one for all frames, unless the camera moves.
+
+    State: the truth, whether the camera moves, and the grounds made so far, by frame.
+    """
+
+    def __init__(self, truth: Truth, view: View | None, size: Array | None) -> None:
+        self.truth, self.moves = truth, isinstance(view, MovingCamera)
+        self._view, self._size, self._made = view, size, dict[int, VisibleGround]()
+
+    def in_frame(self, frame: int) -> VisibleGround:
+        """Returns the ground of a frame, from 1."""
+        k = frame if self.moves else 1
+        if k not in self._made:
+            camera = None if self._view is None else camera_at(self._view, (k - 1) / self.truth.fps)
+            self._made[k] = VisibleGround(self.truth, camera, self._size)
+        return self._made[k]
+
+    def by_frame(self, frame: Ints) -> Iterator[tuple[VisibleGround, slice]]:
+        """Yields the ground of each of the frames (L,) and its row; all rows at once unless the camera moves."""
+        if not self.moves or not len(frame):
+            yield self.in_frame(1), slice(None)
+            return
+        for k, one in enumerate(frame.tolist()):
+            yield self.in_frame(one), slice(k, k + 1)
+
+    def carried(self, frame: Ints, box: Array, pos: Array) -> Array:
+        """Returns boxes (L, 4) px of things that stand on the ground, as a moving camera sees them in the frames (L,).
+
+        box: as the camera of the first frame sees them. pos (L, 2): where they stand, m. A box whose ground is unknown,
+        or behind the camera, becomes empty.
+        """
+        first = self.in_frame(int(frame[0]))
+        out = np.zeros_like(box)
+        for k, one in enumerate(frame.tolist()):
+            here = self.in_frame(one)
+            assert here.camera is not None
+            (u, v) = project(here.camera, np.array([[*pos[k], 0.0]]))[0][0].tolist()
+            if np.isfinite([u, v]).all():
+                foot = box[k, 0] + box[k, 2] / 2, box[k, 1] + box[k, 3]
+                w, h = (box[k, 2:] * (here.usual_height(u, v) / first.usual_height(*foot))).tolist()
+                out[k] = u - w / 2, v - h, w, h
+        return out
 
 
 def labelled_points(truth: Truth, shares: Array) -> Array:

@@ -36,6 +36,7 @@ from sim.render.weather import Foliage, Illumination, draw_illumination, grow_pl
 from sim.rng import look_seed
 from sim.scene import camera as cameras
 from sim.scene.body import RecordedBodies, recorded_bodies, recorded_things
+from sim.scene.camera_motion import View
 from sim.scene.figure import TOPS
 from sim.types import BACKGROUNDS, Array, Camera, Image, Ints, Motion, PixelTruth
 
@@ -44,6 +45,9 @@ if TYPE_CHECKING:
 
 
 FRAMES = 16  # frames of a batch
+# Parts of a Renderer that belong to one place of the camera, and those that do not, by name.
+OF_ONE_CAMERA = ("left_view", "right_view", "_shown_right_view", "_empty_disparities")
+OF_ALL_CAMERAS = ("illumination", "_plants", "_materials", "_atlas", "_noise", "_weights", "_cast", "_while_open")
 SHOTS = 5  # moments of a frame whose mean is the picture, if the shutter stays open
 
 
@@ -90,12 +94,12 @@ class Renderer:
     drawn with the Motion's seed and name (`sim.rng.look_seed`).
     """
 
-    def __init__(
-        self, motion: Motion, camera: Camera, light: Light | None = None, picture: Picture | None = None
-    ) -> None:
+    def __init__(self, motion: Motion, view: View, light: Light | None = None, picture: Picture | None = None) -> None:
         """Takes light and picture as in a scenario, None: the default; raises InputError if the lens distorts."""
         from scenarios.schema.pictures import Light, Picture
 
+        self._view, self._frames, self._instant = view, FRAMES, dict[float, Renderer]()
+        camera = view if isinstance(view, Camera) else view.rest
         if camera.radial != 0:
             raise InputError(
                 place="camera.radial", got=f"{camera.radial:g}", expected="0: a lens that does not distort",
@@ -115,22 +119,22 @@ class Renderer:
     @cached_property
     def left_view(self) -> CameraView:
         """The empty scene as the left (or only) camera sees it."""
-        return self._view(self.camera, 0)
+        return self._view_of(self.camera, 0)
 
     @cached_property
     def right_view(self) -> CameraView:
         """The empty scene as the right camera sees it, without the errors right_… of `Picture`."""
         self.check_pair()
-        return self._view(cameras.right_camera(self.camera), 1)
+        return self._view_of(cameras.right_camera(self.camera), 1)
 
     @cached_property
     def _shown_right_view(self) -> CameraView:
         roll, down = np.radians(self.picture.right_roll_deg), self.picture.right_down_px
         if roll == 0 and down == 0:
             return self.right_view
-        return self._view(cameras.misaligned(self.right_view.camera, roll, down), 1)
+        return self._view_of(cameras.misaligned(self.right_view.camera, roll, down), 1)
 
-    def _view(self, camera: Camera, side: int) -> CameraView:
+    def _view_of(self, camera: Camera, side: int) -> CameraView:
         light, picture = self.illumination, self.picture
         return CameraView(camera, side, self.motion, light, picture, self._plants, self._materials)
 
@@ -168,8 +172,8 @@ class Renderer:
         return np.array([1 - self.light.warmth, 1, 1 + self.light.warmth], np.float32)
 
     @cached_property
-    def _while_open(self) -> list[Renderer]:
-        """Renderers of the same people a little earlier and later, while the shutter is open."""
+    def _while_open(self) -> list[tuple[Renderer, float]]:
+        """Renderers of the same people a little earlier and later, while the shutter is open, and how much later, s."""
         step = self.picture.shutter / SHOTS
         others = [copy(self) for _ in range(SHOTS - 1 if step > 0 else 0)]
         for k, other in zip((-2, -1, 1, 2), others, strict=False):
@@ -177,8 +181,8 @@ class Renderer:
             if (looks := self.motion.looks) is not None:
                 moved = looks.place + k * step * self.motion.fps * np.gradient(looks.place, axis=0)
                 other.motion = other.motion.replace(looks=replace(looks, place=moved))
-            other._first, other._seen, other._shadows = 0, {}, {}
-        return others
+            other._first, other._seen, other._shadows, other._instant = 0, {}, {}, {}
+        return [(other, k * step) for k, other in zip((-2, -1, 1, 2), others, strict=False)]
 
     @property
     def _margin(self) -> int:
@@ -206,17 +210,40 @@ class Renderer:
             hide_behind_people(_rows(bodies, index), canvas.depth, scale, other, out)
         return out
 
+    def at(self, t: float) -> Renderer:
+        """Returns a renderer whose camera stands still where this one's is t s after frame 1; that of the last t is
+        kept."""
+        if isinstance(self._view, Camera):
+            return self
+        if t not in self._instant:
+            for name in OF_ALL_CAMERAS:
+                getattr(self, name)
+            still = copy(self)
+            for name in OF_ONE_CAMERA:
+                still.__dict__.pop(name, None)
+            still.camera = still._view = self._view.at(t)
+            still._frames, still._first, still._seen, still._shadows = 1, 0, {}, {}
+            self._instant.clear()
+            self._instant[t] = still
+        return self._instant[t]
+
+    def _in_frame(self, index: int) -> Renderer:
+        return self.at(self._time(index))
+
     def frame(self, index: int) -> Image:
         """Returns the left image (H, W, 3) of frame `index`, from 1."""
-        return self._draw(self.left_view, index, shade=True, label=False)[0]
+        one = self._in_frame(index)
+        return one._draw(one.left_view, index, shade=True, label=False)[0]
 
     def right(self, index: int) -> Image:
         """Returns the right camera's image (H, W, 3) of frame `index`, from 1."""
-        return self._draw(self._shown_right_view, index, shade=True, label=False)[0]
+        one = self._in_frame(index)
+        return one._draw(one._shown_right_view, index, shade=True, label=False)[0]
 
     def pixels(self, index: int, *, disparity: bool = False) -> PixelTruth:
         """Returns the PixelTruth of frame `index`, from 1. disparity: True adds the disparities, else they are None."""
-        truth = self._draw(self.left_view, index, shade=False, label=True, disparity=disparity)[1]
+        one = self._in_frame(index)
+        truth = one._draw(one.left_view, index, shade=False, label=True, disparity=disparity)[1]
         assert truth is not None
         return truth
 
@@ -225,14 +252,17 @@ class Renderer:
 
         right: also the right image. pixels: also the pixel truth. disparity: the pixel truth gets disparities.
         """
-        image, truth = self._draw(self.left_view, index, shade=True, label=pixels, disparity=disparity and pixels)
+        one = self._in_frame(index)
+        image, truth = one._draw(one.left_view, index, shade=True, label=pixels, disparity=disparity and pixels)
         return RenderedFrame(image, self.right(index) if right else None, truth)
 
     def background(self, k: int) -> Image:
         """Returns the image (H, W, 3) of the scene without people in frame k - 49; k from 0 to 49."""
-        view, index = self.left_view, k - BACKGROUNDS + 1
-        canvas = self._moved_canvas(view, index)
-        image = self._finish(view, canvas, index)
+        index = k - BACKGROUNDS + 1
+        one = self._in_frame(index)
+        view = one.left_view
+        canvas = one._moved_canvas(view, index)
+        image = one._finish(view, canvas, index)
         view.return_canvas(canvas)
         return image
 
@@ -241,10 +271,10 @@ class Renderer:
 
     def _shown(self, view: CameraView, index: int) -> list[Shown]:
         """Returns the people of the batch of frame `index` as a view sees them, then the things, if there are any."""
-        first = index - (index - 1) % FRAMES
+        first = index - (index - 1) % self._frames
         if first != self._first:
-            self._first, self._bodies = first, recorded_bodies(self.motion, first, first + FRAMES)
-            self._things = recorded_things(self.motion, first, first + FRAMES)
+            self._first, self._bodies = first, recorded_bodies(self.motion, first, first + self._frames)
+            self._things = recorded_things(self.motion, first, first + self._frames)
             self._seen, self._shadows = {}, {}
         if view not in self._seen:
             sight = view.camera, view.rays, view.solids, self.illumination.sun
@@ -303,11 +333,14 @@ class Renderer:
         if not self._while_open:
             return
         total = canvas.colour.astype(np.int32)
-        for other in self._while_open:
-            moved = other._draw_crowd(view, index, shade=True, label=False)[0]
+        for other, later in self._while_open:
+            then = other.at(self._time(index) + later)
+            own = view if then is other else then._shown_right_view if view.side else then.left_view
+            moved = then._draw_crowd(own, index, shade=True, label=False)[0]
             total += moved.colour
-            canvas.dirty[:] |= moved.dirty
-            view.return_canvas(moved)
+            # The background is blurred, too, if the camera moves.
+            canvas.dirty[:] |= moved.dirty if own is view else 1
+            own.return_canvas(moved)
         canvas.colour[:] = total // SHOTS
 
     def _draw_crowd(

@@ -151,6 +151,11 @@ def _pinhole(spec: CameraSpec, bodies: RecordedBodies, yaw: float) -> Camera:
         centre = _closest(rotation, slopes, b)
         if centre[2] < LOWEST:
             centre = _at_height(LOWEST, rotation, slopes, b)
+    return pinhole(spec, centre, rotation)
+
+
+def pinhole(spec: CameraSpec, centre: Array, rotation: Array) -> Camera:
+    """Returns the pinhole camera of these settings at a place centre (3,), m. rotation (3, 3): world to camera."""
     return _camera(spec, centre, rotation, baseline=spec.baseline)
 
 

@@ -1,4 +1,7 @@
-"""camera.json and scene.json: a Camera and a Scene (the static world) as JSON, read back equal to the last bit."""
+"""camera.json and scene.json: a Camera and a Scene (the static world) as JSON, read back equal to the last bit.
+
+A camera that moves has no camera.json, so that nobody projects with a wrong one, but a table of its poses.
+"""
 
 from __future__ import annotations
 
@@ -39,6 +42,35 @@ def read_camera(path: Path) -> Camera:
         found.radial,
     )  # fmt: skip
     return require_camera(camera, path)
+
+
+POSE = tuple(f"r{row}{column}" for row in (1, 2, 3) for column in (1, 2, 3))  # the rotation, row by row
+
+
+def cameras_table(cameras: tuple[Camera, ...]) -> bytes:
+    """Returns the content of gt/cameras.parquet, a row per frame: position, m, and rotation, world to camera. The lens,
+    which is that of all frames, is in its metadata."""
+    columns: tables.Columns = {
+        "frame": np.arange(1, len(cameras) + 1), tables.AXES: np.array([c.position for c in cameras]).reshape(-1, 3),
+        POSE: np.array([c.rotation.ravel() for c in cameras]).reshape(-1, 9),
+    }  # fmt: skip
+    first = cameras[0]
+    facts = {key: tables.plain(getattr(first, key)) for key in ("image", "focal_px", "centre_px", "baseline")}
+    return tables.table_bytes(columns, facts, tables.units_of("m"))
+
+
+def read_cameras(path: Path, length: int) -> tuple[Camera, ...]:
+    """Returns the Camera of each of the frames 1 … length in a gt/cameras.parquet."""
+    table = tables.read_table(path)
+    lens = table.facts_as(image=tuple[Pixels, Pixels], focal_px=Pair, centre_px=Pair, baseline=Number)
+    frame, place, pose = table.ints("frame"), table.floats(*tables.AXES), table.floats(*POSE)
+    whole = bool(np.array_equal(frame, np.arange(1, length + 1)))
+    table.reject(not whole, "frame", f"{len(frame)} rows", f"a row for each of the frames 1 to {length}")
+    size = int(lens.image[0]), int(lens.image[1])
+    return tuple(
+        require_camera(Camera("pinhole", size, lens.focal_px, lens.centre_px, p, r.reshape(3, 3), lens.baseline), path)
+        for p, r in zip(place, pose, strict=True)
+    )
 
 
 def scene_document(scene: Scene) -> dict[str, Any]:

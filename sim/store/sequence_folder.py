@@ -19,7 +19,7 @@ from sim.pictures.background_sample import BackgroundChoice
 from sim.pictures.stored_pictures import StoredPictures, write_pictures
 from sim.rng import look_seed
 from sim.store import atomic, seal, tables, truth_files
-from sim.store.camera_files import camera_document, read_camera, read_scene, scene_document
+from sim.store.camera_files import camera_document, cameras_table, read_camera, read_cameras, read_scene, scene_document
 from sim.store.group_files import IMMOBILE, NEVER_ARRIVES
 from sim.store.own_files import is_side_file
 from sim.store.recorded_sequence import recorded_sequence
@@ -28,6 +28,7 @@ from sim.streams import check_streams, coding, is_picture
 from sim.types import Array, Detections, Sequence, Truth
 
 NOTHING: Mapping[str, Any] = {}
+CAMERAS = "gt/cameras.parquet"
 
 
 def write_sequence(
@@ -94,6 +95,8 @@ def sequence_files(
     files = {"scenario.toml": scenario.encode(), "seqinfo.ini": _seqinfo(sequence, len(frames), coding(pixels, images))}
     if sequence.camera is not None:
         files["camera.json"] = tables.json_document(camera_document(sequence.camera))
+    if sequence.load_cameras is not None:
+        files[CAMERAS] = cameras_table(sequence.load_cameras())
     if sequence.scene is not None:
         files["scene.json"] = tables.json_document(scene_document(sequence.scene))
     if sequence.truth is not None:
@@ -178,6 +181,7 @@ def open_sequence(folder: Path, *, background: BackgroundChoice | None = None) -
         px_per_m=tables.none_to_nan(about["px_per_m"]), load_background=load_background,
         load_pixels=pictures.pixel_loader() if {"ids"} <= set(pictures.streams) else None,
         load_light=lambda: _light(folder, manifest),
+        load_cameras=(lambda: read_cameras(folder / CAMERAS, length)) if CAMERAS in has else None,
     )  # fmt: skip
 
 

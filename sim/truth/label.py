@@ -8,25 +8,27 @@ ellipses of body and head, or of POINTS_OF_LIMB (8) in each of more parts.
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import astuple, replace
 
 import numpy as np
 
 from sim.clock import FrameTicks
 from sim.scene.body import Ellipsoids, Outlines, RecordedBodies, contour, outlines, recorded_bodies, recorded_things
-from sim.scene.camera import project, px_per_m_at_centre
-from sim.scene.visibility import measure_visibility
+from sim.scene.camera import project, px_per_m_at_centre, scale_of_all_boxes
+from sim.scene.camera_motion import MovingCamera, View, by_frame, camera_at
+from sim.scene.visibility import BodyVisibility, measure_visibility
 from sim.truth.group_hulls import groups_in_hulls, groups_over_time
 from sim.truth.merge_split_events import GroupsAndEvents
 from sim.truth.motion_rows import MotionRows
 from sim.truth.order_fulfilment import fulfilment
-from sim.types import Array, Camera, GroupEvent, Groups, Ints, Motion, Near, Order, Truth
+from sim.types import Array, Bools, Camera, GroupEvent, Groups, Ints, Motion, Near, Order, Truth
 
 POINTS, POINTS_OF_LIMB = 24, 8  # vertices of each polygon
 INSTANT = 0.02  # s: half the step by which ground velocities become image velocities
 
 
-def image_groups(truth: Truth, camera: Camera, shapes: Ellipsoids) -> tuple[Groups, ...]:
+def image_groups(truth: Truth, view: View, shapes: Ellipsoids) -> tuple[Groups, ...]:
     """Returns the Groups of each frame as the camera sees them.
 
     shapes: ellipsoids of body and head, one row for each row of the truth. Of the result, pos and extent are those of
@@ -37,10 +39,14 @@ def image_groups(truth: Truth, camera: Camera, shapes: Ellipsoids) -> tuple[Grou
     assert truth.vel is not None
 
     def silhouettes(rows: Ints, starts: Ints) -> list[Array]:
-        return hulls(outlines(camera, Ellipsoids(shapes.centre[rows], shapes.shape[rows])), starts)
+        seen = [
+            outlines(camera, Ellipsoids(shapes.centre[rows[r]], shapes.shape[rows[r]]))
+            for camera, r in by_frame(view, truth.frame[rows], truth.fps)
+        ]
+        return hulls(Outlines(*(np.concatenate(part) for part in zip(*map(astuple, seen), strict=True))), starts)
 
     middle = truth.box[:, :2] + truth.box[:, 2:] / 2
-    vel = image_velocities(camera, shapes.centre[:, 0], truth.vel)
+    vel = np.concatenate([np.zeros((0, 2)), *_image_velocities(truth, view, shapes.centre[:, 0])])
     rows = truth.frame, truth.id, truth.group
     return tuple(groups_in_hulls(*rows, middle, vel, silhouettes, 1, truth.length))
 
@@ -53,32 +59,61 @@ def hulls(ellipses: Outlines, starts: Ints) -> list[Array]:
     return list(hull_kernels.convex_hulls([p.reshape(-1, 2) for p in np.split(points, starts[1:])]))
 
 
-def image_velocities(camera: Camera, middle: Array, vel: Array) -> Array:
-    """Returns the velocities (N, 2) px/s in the image of points middle (N, 3) m that move at vel (N, 2) m/s."""
+def _image_velocities(truth: Truth, view: View, middle: Array) -> Iterator[Array]:
+    assert truth.vel is not None
+    for camera, r in by_frame(view, truth.frame, truth.fps):
+        t = 0.0 if not len(truth.frame) else (int(truth.frame[r][0]) - 1) / truth.fps
+        near = (camera, camera) if view is camera else (camera_at(view, t - INSTANT), camera_at(view, t + INSTANT))
+        yield image_velocities(near[0], middle[r], truth.vel[r], near[1])
+
+
+def image_velocities(camera: Camera, middle: Array, vel: Array, after: Camera | None = None) -> Array:
+    """Returns the velocities (N, 2) px/s in the image of points middle (N, 3) m that move at vel (N, 2) m/s.
+
+    camera, after: INSTANT before and after; None: the same camera.
+    """
     step = INSTANT * np.column_stack([vel, np.zeros(len(vel))])
-    return np.asarray((project(camera, middle + step)[0] - project(camera, middle - step)[0]) / (2 * INSTANT))
+    after = camera if after is None else after
+    return np.asarray((project(after, middle + step)[0] - project(camera, middle - step)[0]) / (2 * INSTANT))
 
 
-def bodies(motion: Motion, camera: Camera | None, people: RecordedBodies | None = None) -> Truth:
+def bodies(motion: Motion, view: View | None, people: RecordedBodies | None = None) -> Truth:
     """Returns a Truth with positions, boxes and visibility of everybody in every frame, but without groups.
 
-    Without a camera, boxes are None and visibility is 1. people: the bodies of the motion; None: they are computed.
+    view: the camera. Without one, boxes are None and visibility is 1. people: the bodies of the motion; None: they are
+    computed.
     """
     people = recorded_bodies(motion) if people is None else people
     t, p = people.frame - 1, people.id - 1
-    box, visibility, truncation, visible_box = (None, np.ones(len(p)), None, None) if camera is None else (
-        measure_visibility(
-            camera, motion.scene, people.frame, people.pos3, motion.height[p], people.shapes, recorded_things(motion)
-        )
+    box, visibility, truncation, visible_box = (None, np.ones(len(p)), None, None) if view is None else (
+        _seen(motion, view, people)
     )  # fmt: skip
     return Truth(
         name=motion.name, fps=motion.fps, length=len(motion.present),
-        px_per_m=float("nan") if camera is None else px_per_m_at_centre(camera), frame=people.frame, id=people.id,
+        px_per_m=float("nan") if view is None else _scale(view, box), frame=people.frame, id=people.id,
         group=np.full(len(p), -1, np.int64), subgroup=_subgroups(motion, t, p),
         pos=motion.pos[t, p], vel=motion.vel[t, p],
         box=box, visibility=visibility, z=people.pos3[:, 2], heading=motion.heading[t, p], height=motion.height[p],
         truncation=truncation, visible_box=visible_box, orders=motion.orders,
     )  # fmt: skip
+
+
+def _seen(motion: Motion, view: View, people: RecordedBodies) -> BodyVisibility:
+    parts = []
+    for camera, r in by_frame(view, people.frame, motion.fps):
+        shapes = Ellipsoids(people.shapes.centre[r], people.shapes.shape[r])
+        first = int(people.frame[r][0]) if view is not camera and len(people.frame) else 1
+        things = recorded_things(motion, first, None if view is camera else first + 1)
+        known = people.frame[r], people.pos3[r], motion.height[people.id[r] - 1], shapes
+        parts.append(measure_visibility(camera, motion.scene, *known, things))
+    return BodyVisibility(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
+
+
+def _scale(view: View, box: Array | None) -> float:
+    """Returns the image scale, px per m; of a moving camera that of the boxes whose whole bodies are known."""
+    if isinstance(view, Camera) or box is None:
+        return px_per_m_at_centre(camera_at(view, 0.0))
+    return scale_of_all_boxes(box[np.isfinite(box).all(axis=1), 3])
 
 
 def _subgroups(motion: Motion, t: Ints, p: Ints) -> Ints | None:
@@ -95,28 +130,60 @@ def _subgroups(motion: Motion, t: Ints, p: Ints) -> Ints | None:
     return np.where(inside & (people[t, own] > 1), own - first + 1, -1)
 
 
-def label(motion: Motion, camera: Camera | None) -> Truth:
-    """Returns the whole Truth of a motion: that of `bodies`, with groups, events and hard negatives added."""
+def label(motion: Motion, view: View | None) -> Truth:
+    """Returns the whole Truth of a motion: that of `bodies`, with groups, events and hard negatives added.
+
+    A moving camera loses people for good, as in recordings: people who are wholly outside the image have no row in that
+    frame, and groups are of those who are left. `events_in_view` leaves out what it does not show.
+    """
     from sim.truth.merge_split_events import groups_and_events
 
     people = recorded_bodies(motion)
-    truth = bodies(motion, camera, people)
+    truth = bodies(motion, view, people)
     s = motion.states()
     rows = MotionRows.of_table(s.pos, s.vel, s.present, s.intent)
     rows = replace(rows, walls=s.walls or ((0, motion.scene.walls),))
     found, group = groups_and_events(rows, s.rate), np.full(s.present.shape, -1)
     group[rows.frame, rows.column] = found.group
     shown = FrameTicks.of(truth.length, motion.fps, s.rate, s.present)
-    truth = truth.replace(group=group[shown.tick[people.frame - 1], people.id - 1])
+    truth, shapes = truth.replace(group=group[shown.tick[people.frame - 1], people.id - 1]), people.shapes
+    if isinstance(view, MovingCamera):
+        inside = in_view(truth)
+        truth, shapes = truth.keep(inside), Ellipsoids(shapes.centre[inside], shapes.shape[inside])
     assert truth.pos is not None
     assert truth.vel is not None
     ground = tuple(groups_over_time(truth.frame, truth.id, truth.group, truth.pos, truth.vel, 1, truth.length))
     events, orders = _events_in_frames(_events(rows, found, s.rate, motion), motion, group, shown)
     return truth.replace(
-        groups=ground, groups_px=None if camera is None else image_groups(truth, camera, people.shapes),
+        groups=ground, groups_px=None if view is None else image_groups(truth, view, shapes),
         labelled=np.ones(truth.length, dtype=np.bool_), events=events, near=_near_in_frames(found.near, shown),
         orders=orders,
     )  # fmt: skip
+
+
+def in_view(truth: Truth) -> Bools:
+    """Returns which rows (R,) of a truth with boxes are people who are at least partly in the image."""
+    assert truth.truncation is not None
+    return np.asarray(truth.truncation < 1.0)
+
+
+def events_in_view(truth: Truth) -> Truth:
+    """Returns the truth with the events and hard negatives whose people all have rows in their first and last frame.
+
+    An order whose event is left out has none.
+    """
+    assert truth.events is not None
+    assert truth.near is not None
+
+    def seen(frame: int) -> set[int]:
+        return set(truth.id[truth.rows(frame)].tolist())
+
+    kept = [k for k, e in enumerate(truth.events) if seen(e.start) & seen(e.end) >= set(e.members)]
+    place, near = {k: n for n, k in enumerate(kept)}, truth.near
+    pairs = zip(near.start.tolist(), near.end.tolist(), near.a.tolist(), near.b.tolist(), strict=True)
+    both = np.array([seen(start) & seen(end) >= {a, b} for start, end, a, b in pairs], np.bool_)
+    orders = (replace(o, event=None if o.event is None else place.get(o.event)) for o in truth.orders)
+    return truth.replace(events=tuple(truth.events[k] for k in kept), orders=tuple(orders), near=near.keep(both))
 
 
 def _events(rows: MotionRows, found: GroupsAndEvents, rate: float, motion: Motion) -> list[GroupEvent]:

@@ -28,7 +28,7 @@ import math
 import cv2
 import numpy as np
 
-from sim.types import Bools, Image
+from sim.types import Array, Bools, Image
 from tracking.detect import background_kernels as kernels
 from tracking.detect import brightness_gain
 from tracking.detect.background_kernels import BACKGROUND as BACKGROUND
@@ -106,8 +106,10 @@ class Background:
         shadows = darkest_shadow(self._darkened, settings.dark) if settings.adaptive else None
         self.bounds = unknown if shadows is None else (shadows, bright)
 
-    def classify(self, image: Image) -> Image:
+    def classify(self, image: Image, shown: Bools | None = None) -> Image:
         """Returns the class of each pixel of a frame (H, W, 3) BGR uint8, as (H, W) uint8.
+
+        shown (H, W): False where the frame shows nothing, which is BACKGROUND; None: True everywhere.
 
         The classes: 0 BACKGROUND, 1 FOREGROUND, 2 DARK (dark foreground), 3 SHADOW, 4 HIGHLIGHT. A pixel whose `valid`
         is False is always BACKGROUND. An adaptive model estimates its `gain` first; mean and variance do not change.
@@ -116,12 +118,14 @@ class Background:
         """
         check_frame(image, self.valid.shape)
         if self.settings.adaptive:
-            self.gain = self._estimate_gain(image)
+            self.gain = self._estimate_gain(image, self.valid if shown is None else self.valid & shown)
         limits = np.array([*self.thresholds, *self.bounds], np.float32)
         classes = np.empty(self.valid.shape, np.uint8)
         one, two, three = (plane.ravel() for plane in colour_planes(image))
         E, V = self.mean.reshape(3, -1), self.var.reshape(3, -1)
         kernels.classify(one, two, three, E, V, self.s.ravel(), self.b.ravel(), self.gain, limits, classes.reshape(-1))
+        if shown is not None:
+            classes[~shown] = BACKGROUND
         self._grid_background = ~fused_foreground(classes[self._grid]) & self.valid[self._grid]
         return classes
 
@@ -170,12 +174,32 @@ class Background:
         self.gain, self._grid_background = np.ones(3, np.float32), self.valid[self._grid]
         self.follow(self.settings)
 
-    def _estimate_gain(self, image: Image) -> Floats:
+    def carry(self, step: Array, whole: bool) -> None:
+        """Moves the model in its image by a homography `step` (3, 3), px; what comes into view becomes not `valid`.
+
+        whole: the step is a shift by whole px, so that no colour is interpolated.
+        """
+        size, flags = self.valid.shape[::-1], cv2.INTER_NEAREST if whole else cv2.INTER_LINEAR
+        middle = np.median(self.s[self.valid]), np.median(self.b[self.valid])
+        s, b = (np.where(self.valid, n, m) for n, m in zip((self.s, self.b), middle, strict=True))
+        for planes in (self.mean, self.var):
+            for plane in planes:
+                plane[:] = cv2.warpPerspective(plane, step, size, flags=flags, borderValue=1.0)
+        self.valid = cv2.warpPerspective(self.valid.astype(np.uint8) * 255, step, size, flags=flags) == 255
+        moved = (cv2.warpPerspective(n.astype(np.float32), step, size, flags=flags) for n in (s, b))
+        self.s, self.b = (np.where(self.valid, n, np.float32(np.inf)) for n in moved)
+        self._grid_background &= self.valid[self._grid]
+
+    def picture(self) -> Image:
+        """Returns the empty scene (H, W, 3) BGR uint8 in the brightness of the last frame."""
+        return np.asarray(np.clip(np.moveaxis(self.mean * self.gain[:, None, None], 0, -1) + 0.5, 0, 255), np.uint8)
+
+    def _estimate_gain(self, image: Image, known: Bools) -> Floats:
         seen = np.moveaxis(image[self._grid], -1, 0).astype(np.float32)
-        mean = self.mean[:, *self._grid]
-        found = brightness_gain.gain(seen, mean, self._grid_background)
+        mean, known = self.mean[:, *self._grid], known[self._grid]
+        found = brightness_gain.gain(seen, mean, self._grid_background & known)
         if found is None:
-            found = brightness_gain.gain(seen, mean, self.valid[self._grid])
+            found = brightness_gain.gain(seen, mean, known)
         return self.gain if found is None else found
 
 

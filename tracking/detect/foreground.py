@@ -13,15 +13,18 @@ From the background sample the pipeline also learns the size of people, and the 
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 
-from sim.types import Array, Bools, Context, Image
+from sim.types import Array, Bools, Context, Detections, Image, Tracks
 from tracking.detect import blobs
 from tracking.detect.background import Background, fused_foreground
 from tracking.detect.background_settings import BackgroundSettings
+from tracking.detect.background_training import check_frame
+from tracking.detect.camera_motion import Laid, Stabiliser, boxes_after, in_picture, on_one_picture, poses_of_sample
 from tracking.detect.ghosts import Ghosts, uncovered_in_sample
 from tracking.detect.person_size import PersonSize
 from tracking.detect.picture_check import PictureCheck
@@ -31,6 +34,13 @@ from tracking.detect.smoothing import independent_noise, smoothed, window
 LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0
 ASSUMED_HEIGHT = 18.0  # m that the image is assumed to be high while its scale is unknown.
 MOST_FOREGROUND = 0.6  # Share of the image: a frame with more foreground is not measured (ours).
+CHECK_TIME = 1.0  # s from one look at whether the camera moves to the next
+SUSPECT = 0.25  # share of foreground at which it is looked at in each picture
+LEAST_SIGNS = 2  # looks in a row that find a movement
+MOVES = (
+    "the camera moves: the background follows it, and a place in the picture is no place on the ground. People may be "
+    "missed where new parts of the scene come into view"
+)
 SAMPLED = 25  # About so many frames of the background sample are searched for people who stand alone.
 
 
@@ -48,6 +58,7 @@ class Segmented:
     classes: Image
     mask: Bools
     plausible: bool
+    shown: Bools | None = None  # (H, W): what the picture shows of the model; None: all, as the camera stands still
 
 
 class Foreground:
@@ -55,8 +66,9 @@ class Foreground:
 
     State: model, the background model; window, side of the window (px) over which pictures are averaged, 1: none;
     check, which warns of pictures that cannot be measured; px_per_m, the scale of the image: the context's, or, if that
-    is nan, learned from lone people, nan until then. Raises InputError for an unusable background sample,
-    AssertionError for none.
+    is nan, learned from lone people, nan until then; stabiliser, which lays pictures on the model since the camera was
+    found to move; None while it stands still. Masks and blobs are those on the model; `in_picture` moves tracks to the
+    picture. Raises InputError for an unusable background sample, AssertionError for none.
     """
 
     def __init__(self, context: Context, settings: BackgroundSettings) -> None:
@@ -67,11 +79,23 @@ class Foreground:
         assert context.background is not None
         self.px_per_m, self._learns = context.px_per_m, bool(np.isnan(context.px_per_m))
         self.window = window(independent_noise(context.background)) if settings.adaptive else 1
-        sample = context.background
+        self.check, self._complete = PictureCheck(), True
+        self._fps, sample = context.fps, context.background
         if self.window > 1:
             sample = np.stack([smoothed(image, self.window) for image in sample])
+        self.stabiliser: Stabiliser | None = None
+        self._watch: Stabiliser | None = None
+        self._unchecked = self._signs = 0
+        self._step = np.eye(3)
+        poses = poses_of_sample(sample) if np.ndim(sample) == 4 and len(sample) > 2 else None
+        if poses is not None:
+            sample, known = on_one_picture(sample, poses)
+            self.stabiliser = Stabiliser(sample[len(sample) // 2], known, self._fps, poses)
+            warnings.warn(MOVES, stacklevel=2)
         self.model = Background(sample, context.fps, settings)
-        self.check, self._complete = PictureCheck(), True
+        if self.stabiliser is not None:
+            self.model.valid &= known
+            self.stabiliser.look_at(self.model.picture(), self.model.valid)
         self.ghosts = Ghosts(self.shape, self.model.noise(), context.fps) if settings.adaptive else None
         if settings.adaptive:
             self.model.mend(uncovered_in_sample(self.model.mean, self.model.second, self.scale), self.model.second)
@@ -101,11 +125,72 @@ class Foreground:
         The background model does not learn from the picture; only its estimate of the picture's brightness changes.
         Raises InputError if the picture's size or dtype is not that of the background sample.
         """
-        image = smoothed(image, self.window)
-        classes = self.model.classify(image)
+        given, image, shown = image, smoothed(image, self.window), None
+        if self.stabiliser is not None:
+            check_frame(image, self.shape)
+            laid = self._laid(image, self.stabiliser)
+            if laid is None:
+                nothing = np.zeros(self.shape, np.uint8)
+                return Segmented(image, nothing, nothing.astype(bool), False, nothing.astype(bool))
+            image, shown = laid.image, laid.shown
+        classes = self.model.classify(image, shown)
         mask = blobs.clean(fused_foreground(classes), self.scale)
-        flooded = self.model.settings.adaptive and np.count_nonzero(mask) / mask.size > MOST_FOREGROUND
-        return Segmented(image, classes, mask, not flooded)
+        share = np.count_nonzero(mask) / mask.size
+        if self.stabiliser is None and self._moves(image, share):
+            warnings.warn(MOVES, stacklevel=2)
+            self.stabiliser = self._watch
+            return self.segment(given)
+        flooded = self.model.settings.adaptive and share > MOST_FOREGROUND
+        return Segmented(image, classes, mask, not flooded, shown)
+
+    def _moves(self, image: Image, foreground: float) -> bool:
+        """Returns whether the camera was found to move in this picture. foreground: share of the picture."""
+        self._unchecked += 1
+        if self._unchecked < self._fps * CHECK_TIME and not self._signs and foreground < SUSPECT:
+            return False
+        if self._watch is None or self._unchecked >= self._fps * CHECK_TIME:
+            self._watch = Stabiliser(self.model.picture(), self.model.valid, self._fps)
+        self._unchecked = 0
+        self._signs = self._signs + 1 if self._watch.has_moved(image) else 0
+        return self._signs >= LEAST_SIGNS
+
+    def _laid(self, image: Image, stabiliser: Stabiliser) -> Laid | None:
+        """Returns a picture laid on the model, which follows the camera; None if it cannot be laid."""
+        laid = stabiliser.lay(image)
+        if laid is None:
+            return None
+        step = stabiliser.step()
+        if step is not None:
+            whole = bool((step[:2, :2] == np.eye(2)).all() and (step[2] == (0, 0, 1)).all())
+            self.model.carry(step, whole)
+            if self.ghosts is not None:
+                self.ghosts.carry(step)
+            self._step = step @ self._step
+            stabiliser.moved_by(step)
+            stabiliser.look_at(self.model.picture(), self.model.valid)
+            laid = stabiliser.laid_again(image)
+        fresh = laid.shown & ~self.model.valid
+        if fresh.any():
+            colour = np.moveaxis(laid.image, -1, 0).astype(np.float32) / self.model.gain[:, None, None]
+            self.model.mend(fresh, colour)
+        return laid
+
+    def take_step(self) -> Array | None:
+        """Returns the homography (3, 3) by which the image of the model has moved since the last call; None if it has
+        not."""
+        step, self._step = self._step, np.eye(3)
+        return None if (step == np.eye(3)).all() else step
+
+    def on_model(self, found: Detections) -> Detections:
+        """Returns detections in the last picture as detections in the image of the model."""
+        if self.stabiliser is None or found.box is None:
+            return found
+        box = boxes_after(self.stabiliser.pose, found.box)
+        return found.replace(box=box, **({"pos": box[:, :2] + box[:, 2:] / 2} if found.plane == "image" else {}))
+
+    def in_picture(self, tracks: Tracks) -> Tracks:
+        """Returns tracks in the image of the model as tracks in the last picture."""
+        return tracks if self.stabiliser is None else in_picture(tracks, self.stabiliser.pose)
 
     def adapt(self, seen: Segmented, protected: Bools) -> None:
         """Lets the background model learn from a segmented picture, except at pixels where `protected` (H, W) is True.
@@ -113,6 +198,10 @@ class Foreground:
         seen: the result of the last `segment`, as that call also set the brightness of the model. Each call changes
         every fourth row. Ghosts are replaced also where `protected` is True, but not in an implausible picture.
         """
+        if seen.shown is not None:
+            if not seen.shown.any():
+                return
+            protected = protected | ~seen.shown
         self.model.adapt(seen.image, seen.classes, protected)
         self.check.add(seen.plausible, self._complete, self.model.noise)
         if seen.plausible and self.ghosts is not None:

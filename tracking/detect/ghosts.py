@@ -25,7 +25,7 @@ import math
 import cv2
 import numpy as np
 
-from sim.types import Bools, Image
+from sim.types import Array, Bools, Image
 from tracking.detect import background_kernels, blobs
 from tracking.detect.background import colour_planes
 from tracking.detect.background_kernels import Floats
@@ -65,6 +65,12 @@ class Ghosts:
         self._every = max(1, round(SIGHTING * fps))
         self._step = self._every / fps
         self._frames = 0
+
+    def carry(self, step: Array) -> None:
+        """Moves what was seen in the image by a homography `step` (3, 3), px."""
+        size = self.sightings.shape[::-1]
+        for plane in (*self.colour, self.sightings):
+            plane[:] = cv2.warpPerspective(plane, step, size, flags=cv2.INTER_NEAREST)
 
     def find(
         self, image: Image, gain: Floats, mask: Bools, model: Floats, px_per_m: float, least: float

@@ -22,7 +22,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from sim.types import Array, Bools, Context, Detections, Frame, Plane
+from sim.types import Array, Bools, Context, Detections, Frame, Plane, Tracks
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.blobs import Blobs
 from tracking.detect.foreground import Foreground, convex_areas
@@ -179,6 +179,10 @@ class PointTracker:
         if self.pixels.settings is not self.config:
             self.pixels.follow(self.config)
         return self.pixels.detections(frame, np.zeros((0, 4)) if boxes is None else boxes)
+
+    def in_picture(self, tracks: Tracks) -> Tracks:
+        """Returns the tracks of a frame as they are in its picture: from pixels, a camera that moves is compensated."""
+        return tracks if self.pixels is None else self.pixels.foreground.in_picture(tracks)
 
     def points(self, detections: Detections) -> tuple[Array, Array]:
         """Sets `plane` to that of the detections, and returns their positions and box sizes as `ordered_points`."""

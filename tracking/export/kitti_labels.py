@@ -95,6 +95,8 @@ def solids(labelled: LabelledPictures, people: PicturePeople) -> Array:
     """Returns alpha, height, width, length, x, y, z and rotation_y (N, 8) of people; KITTI's "unknown" without a
     pinhole camera."""
     truth, camera, rows = labelled.truth, labelled.sequence.camera, people.rows
+    if labelled.cameras and len(rows):
+        camera = labelled.cameras[int(truth.frame[rows[0]]) - 1]
     known = truth.pos is not None and truth.height is not None and truth.heading is not None
     if not known or camera is None or camera.kind != "pinhole":
         return np.tile(UNKNOWN, (len(rows), 1))

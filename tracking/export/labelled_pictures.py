@@ -25,7 +25,7 @@ from sim.store import atomic, tables
 from sim.store.own_files import is_side_file
 from sim.store.seal import read_whole_manifest, reject_sealed
 from sim.streams import file_name
-from sim.types import Array, Bools, Ints, Sequence, Truth
+from sim.types import Array, Bools, Camera, Ints, Sequence, Truth
 from tracking.export import MIN_VISIBILITY
 from tracking.recordings.mot_folder import left_pictures
 from tracking.recordings.source import open_source
@@ -97,6 +97,11 @@ class LabelledPictures:
         """Width and height of the pictures, px; of a sequence without pictures those that its boxes show."""
         assert self.truth.box is not None
         return self.sequence.image_size or image_size_of_boxes(self.truth.box)
+
+    @cached_property
+    def cameras(self) -> tuple[Camera, ...]:
+        """The camera of each frame if it moves, else ()."""
+        return () if self.sequence.load_cameras is None else self.sequence.load_cameras()
 
     @property
     def split(self) -> str:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from functools import partial
 
 import numpy as np
 
 from sim.scene.camera import BOXES as SCALE_BOXES
-from sim.types import Camera, Groups, Scene, Tracks
+from sim.types import Array, Camera, Groups, Scene, Tracks
 from tracking.grouping.foot_points import boxes_stand, ground_below, places_on
 from tracking.grouping.ground_of_boxes import BOXES, LONGEST, Ground
 from tracking.grouping.grouped_tracks import GroupsSoFar, Velocities, names_groups
@@ -25,7 +24,8 @@ class Completion:
     image_size: as of `foot_points.completed`.
 
     State: waiting, the tracks of frames that are not completed yet; scale, ground, that were found; groups, which
-    complete the tracks; velocities, which fill in no more than that; both None until ground and scale are known.
+    complete the tracks; velocities, which fill in no more than that; both None until ground and scale are known;
+    moving, the frame from which on the camera moves and boxes show no ground, None while it stands still.
     """
 
     def __init__(
@@ -38,6 +38,7 @@ class Completion:
         self.groups: GroupsSoFar | None = None
         self.velocities: Velocities | None = None
         self.boxes = 0
+        self.moving: int | None = None
 
     @property
     def settled(self) -> bool:
@@ -74,7 +75,7 @@ class Completion:
         if first.unit == "group" or first.plane != "image" or last.t > first.t + LONGEST:
             return True
         known = np.isfinite(self.known.px_per_m) or np.isfinite(self.learned())
-        stands = boxes_stand(self.waiting)
+        stands = boxes_stand(self.waiting) and not self._moves(last)
         if stands and self.camera is None and not names_groups(self.waiting):
             return self.boxes >= BOXES
         return known or (stands and self.camera is not None) or self.boxes > SCALE_BOXES
@@ -83,16 +84,24 @@ class Completion:
         waiting, self.waiting = self.waiting, []
         self.scale = image_scale.from_tracks(self.known, self.learned(), waiting)
         px_per_m = self.scale.px_per_m
-        if not any(t.unit == "group" for t in waiting):
+        if not any(t.unit == "group" for t in waiting) and not self._moves(waiting[-1]):
             self.ground = ground_below(waiting, self.camera, px_per_m, self.image_size)
         if self.ground.camera is not None:
-            places = partial(places_on, self.ground, self.scene)
-            self.groups = GroupsSoFar(self.fps, 1.0, self.rule, places=places)
+            self.groups = GroupsSoFar(self.fps, 1.0, self.rule, places=self._places)
         elif waiting[0].unit == "person" and (waiting[0].plane != "image" or np.isfinite(px_per_m)):
             self.groups = GroupsSoFar(self.fps, px_per_m, self.rule)
         else:
             self.velocities = Velocities(self.fps)
         return self._completed(waiting)
+
+    def _moves(self, tracks: Tracks) -> bool:
+        return self.moving is not None and self.moving <= tracks.index
+
+    def _places(self, tracks: Sequence[Tracks]) -> Array:
+        """Returns where people are on the ground, (R, 2), m; in the image, by its scale, once the camera moves."""
+        still = [t for t in tracks if not self._moves(t)]
+        moved = [t.pos / self.scale.px_per_m for t in tracks[len(still) :]]
+        return np.concatenate([places_on(self.ground, self.scene, still), *moved])
 
     def _completed(self, tracks: Sequence[Tracks]) -> list[Tracks]:
         if self.groups is not None:

@@ -69,6 +69,8 @@ class RunningTracker:
             self.idle.append(Frame(frame.index, frame.t))
             return []
         tracks, idle = self.prepared.step(frame), self.idle
+        if self.completion.moving is None and getattr(self.prepared.tracker, "camera_moves", False):
+            self.completion.moving = frame.index
         self.idle = []
         nobody = np.zeros(len(tracks.id), bool)
         empty = tracks.replace(groups=None, events=()).keep(nobody) if idle else tracks

@@ -59,6 +59,10 @@ def _speeds(value: float) -> list[Setting]:
     return [Setting("crowd.free_speed", {"normal": [1.34, _number(value)], "clip": [0.3, 2.6]})]
 
 
+def _shake(value: float) -> list[Setting]:
+    return [Setting("camera.motion", {"kind": "shake", "px": _number(value)})]
+
+
 AXES = {
     axis.name: axis
     for axis in (
@@ -72,6 +76,7 @@ AXES = {
         Axis("frame-rate", 25.0, 1.0, _key("camera.fps"), about="frames per second"),
         Axis("camera-height", 15.0, 3.0, _key("camera.height"), about="m"),
         Axis("tilt", 80.0, 15.0, _key("camera.tilt_deg"), about="degrees by which the camera looks down"),
+        Axis("camera-motion", 0.0, 20.0, _shake, about="px, standard deviation of a trembling camera's movement"),
         Axis("light", 0.0, 0.3, _key("light.drift"), about="relative changes of brightness, of pictures"),
         Axis("contrast", 0.0, 20.0, _key("picture.noise"), about="noise of pictures, grey levels"),
     )

@@ -5,9 +5,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from scenarios.loading.resolve import load
 from scenarios.schema.sensor import FalseAlarms, Sensor
 from sim.detector.sense import sense
-from sim.scene.camera import foot_points
+from sim.scene.camera import foot_points, project
+from sim.sequence import simulate
 from sim.truth.label import bodies
 from sim.types import Detections, Truth
 from tests.reference_sense import above, crowd, pinhole
@@ -67,3 +69,18 @@ def test_everything_is_finite_whatever_is_known(camera: Any) -> None:
     nobody = truth.replace(**{f: getattr(truth, f)[:0] for f in ("frame", "id", "group", "pos", "vel", "box",
                               "visibility", "visible_box", "z")})  # fmt: skip
     assert (sum(len(d.pos) for d in alarms(nobody, camera=camera, **model)) > 0) == (camera is not None)
+
+
+def test_false_alarms_of_a_moving_camera_stand_still_in_the_world() -> None:
+    alarms = "{near=0.0, life=60.0, drift=0.0, jitter=0.0, seen=1.0}"
+    settings = ["duration=3", "sensor.detect_prob=0", "sensor.clutter_rate=4", f"sensor.false_alarms={alarms}"]
+    settings += ["sensor.box=amodal", "camera.motion={kind='pan', deg_per_s=4}"]
+    sequence = simulate(load("cross", settings), 90_001, streams=())
+    assert sequence.load_cameras is not None
+    cameras, found = sequence.load_cameras(), [f.detections for f in sequence]
+    assert all(d is not None and len(d.pos) > 0 for d in found)
+    for d, camera in zip(found, cameras, strict=True):
+        foot = d.box[:, :2] + d.box[:, 2:] * [0.5, 1.0]
+        assert project(camera, np.column_stack([d.pos, np.zeros(len(d.pos))]))[0] == pytest.approx(foot, abs=1e-6)
+    first, last = ({tuple(p) for p in np.round(d.pos, 6).tolist()} for d in (found[0], found[-1]))
+    assert first & last

@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 from sim.types import Array, Context, Ints
+from tracking.detect.camera_motion import mapped
 from tracking.detect.person_size import upright
 from tracking.filters import existence, kalman, track_uncertainty
 from tracking.papers.blob import person_look_kernels
@@ -68,6 +69,10 @@ class TrackedEllipses(TrackedPeople):
         self.lasting = np.minimum(lasting, 1.0)
         shown, hidden = self.transition[:2, :2]
         self.detector = (shown[0] * self.detector + shown[1] * (1 - self.detector)) / (shown[0] + hidden[0])
+
+    def carry(self, step: Array) -> None:
+        """Moves all tracks in the image by a homography `step` (3, 3), as its reference follows the camera."""
+        self.bank[kalman.PLACE, :, :2] = mapped(step, self.bank[kalman.PLACE, :, :2])
 
     def compute_rho(self) -> Array:
         """Returns rho (N,) of all tracks: sqrt|S| over its asymptote, S the innovation covariance by the nominal

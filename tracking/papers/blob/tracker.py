@@ -79,7 +79,17 @@ class Blob:
         camera, every = self.context.camera, np.arange(len(self.people.id))
         if camera is not None:
             self.people.place_on_ground(camera, self.updater.reported_boxes(every))
-        return self._report(frame)
+        found = self._report(frame)
+        return (
+            found
+            if self.context.background is None
+            else cast("PixelUpdater", self.updater).foreground.in_picture(found)
+        )
+
+    @property
+    def camera_moves(self) -> bool:
+        """True if the camera was found to move, so that a place in the picture is no place on the ground."""
+        return self.updater.camera_moves
 
     def _report(self, frame: Frame) -> Tracks:
         people = self.people

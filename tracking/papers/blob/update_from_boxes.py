@@ -8,9 +8,12 @@ a score from 0 to 1.
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
 from sim.types import Array, Detections, Frame, Ints
+from tracking.detect.box_motion import BoxMotion
 from tracking.filters import kalman
 from tracking.filters.existence import ScoreCalibration
 from tracking.papers.blob import box_geometry
@@ -18,6 +21,10 @@ from tracking.papers.blob.config import CONFIRM_GATE, BlobConfig
 from tracking.papers.blob.tracked_people import LEAST_EXISTENCE, TrackedPeople
 from tracking.running import image_scale
 
+MOVES = (
+    "the camera moves: all boxes jump together, as people do not. Tracks follow the picture, and a place in it is no "
+    "place on the ground"
+)
 # s: time constant with which rates of height and width return to zero. Without it a missed person shrinks or grows on.
 SIZE_RATE_TIME = 1.0
 
@@ -27,11 +34,11 @@ class BoxUpdater:
 
     State: people, the table of tracks; scores, the calibration of scores; gate, confirm_gate: largest d^2 (squared
     Mahalanobis distance) of an association and of a measurement that may confirm a track; fading (5, 1, 4): factors
-    of the filters in each frame.
+    of the filters in each frame; motion, what the boxes tell of a camera that moves.
     """
 
     def __init__(self, config: BlobConfig, people: TrackedPeople) -> None:
-        self.people, self.scores = people, ScoreCalibration()
+        self.people, self.scores, self.motion = people, ScoreCalibration(), BoxMotion(people.context.fps)
         self.follow(config)
 
     def follow(self, config: BlobConfig) -> None:
@@ -50,6 +57,7 @@ class BoxUpdater:
         people.predict(observed=detections is not None)
         if people.by_existence:
             people.bank *= self.fading
+        self._follow_camera(z, frame.t)
         people.widen_view(z)
         d2, log_det = people.innovations(z)
         rows, columns = np.nonzero(d2 <= self.gate)
@@ -67,6 +75,19 @@ class BoxUpdater:
         free &= (person >= LEAST_EXISTENCE) | (not people.by_existence)
         people.delete_tracks(frame.t)
         people.start_tracks(z[free], score[free], frame.t, person[free])
+
+    @property
+    def camera_moves(self) -> bool:
+        """True if the camera was found to move."""
+        return self.motion.moves
+
+    def _follow_camera(self, z: Array, t: float) -> None:
+        people, known = self.people, self.motion.moves
+        move = self.motion.shift(z, people.upright_boxes()[people.confirmed], people.px_per_m, t)
+        if self.motion.moves and not known:
+            warnings.warn(MOVES, stacklevel=2)
+        if move is not None:
+            people.bank[kalman.PLACE, :, :2] += move
 
     def reported_boxes(self, rows: Ints) -> Array:
         """Returns the boxes (K, 4) that the tracker reports for the tracks at positions `rows` (K,): centre x, y,

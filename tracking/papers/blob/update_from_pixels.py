@@ -114,11 +114,15 @@ class PixelUpdater:
         people.px_per_m = foreground.scale
         seen = None if frame.image is None else foreground.segment(frame.image)
         looked = seen is not None and seen.plausible
+        step = foreground.take_step()
+        if step is not None:
+            people.carry(step)
         people.predict(observed=looked)
         people.widen_view(np.zeros((0, 4)))
         boxed = np.zeros(0, np.int64)
         if detections is not None:
-            boxed = self.boxes.measure(frame.t, detections, frame.image if looked else None, self.gates[0])
+            there = seen.image if seen is not None and looked else None
+            boxed = self.boxes.measure(frame.t, foreground.on_model(detections), there, self.gates[0])
             people.expect(looked * self.config.detect_prob)
         if seen is None or not seen.plausible:
             if seen is not None:
@@ -138,6 +142,11 @@ class PixelUpdater:
     def _protected(self) -> Bools:
         boxes = self._person_boxes(self.people.upright_boxes()[self.people.confirmed])
         return person_template.template_mask(self.foreground.shape, box_geometry.standing(boxes))
+
+    @property
+    def camera_moves(self) -> bool:
+        """True if the camera was found to move."""
+        return self.foreground.stabiliser is not None
 
     def reported_boxes(self, rows: Ints) -> Array:
         """Returns the boxes (K, 4) that the tracker reports for the tracks at positions `rows` (K,): centre x, y,

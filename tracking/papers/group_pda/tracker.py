@@ -103,7 +103,8 @@ class GroupPda:
             self.bank.predict(self._scaled_parameters(1))
         self.interval += 1
         events = [] if points is None else list(self._look(points, weights, frame.t))
-        return self._report(frame, events, self._about(detections))
+        tracks = self._report(frame, events, self._about(detections))
+        return tracks if self.pixels is None else self.pixels.foreground.in_picture(tracks)
 
     def _report(self, frame: Frame, events: list[WholeGroupEvent], outline: Array) -> Tracks:
         """Returns the confirmed groups that had points within the last `report_coast` s, by id.

@@ -89,7 +89,7 @@ class Joint(PointTracker):
             free = np.setdiff1d(np.arange(len(points)), columns)
             self._keep(self.people.states.sum(axis=1) >= LEAST_PRESENCE)
             self._newcomers(points[free], sizes[free])
-        return tracks
+        return self.in_picture(tracks)
 
     def _associate(self, points: Array) -> tuple[Ints, Ints, Array]:
         c, ahead = self.config, moved(self.nested.x, self.dt)

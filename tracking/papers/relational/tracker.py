@@ -111,7 +111,7 @@ class Particle(PointTracker):
             few = self.particles.resample(1.0 if one else RESAMPLE_SHARE, self._uniforms)
             if not one and len(few):
                 self.particles.spread(few, self._normals(few))
-        return tracks
+        return self.in_picture(tracks)
 
     def _forecast(self) -> None:
         p, c = self.particles, self.config
