@@ -110,7 +110,7 @@ def _displaced(pos: Array, sensed: Array, box: Array, truth: Truth, seen: Bools,
     whole, views = truth.box[seen], list(by_frame(camera, truth.frame[seen], truth.fps))
     if sensor.points == "seen":
         shifts = [seen_shift(sensed[r], whole[r], z[r], one) for one, r in views]
-        return pos + np.concatenate([np.zeros((0, 2)), *shifts])
+        return np.asarray(pos + np.concatenate([np.zeros((0, 2)), *shifts]))
     at = np.concatenate([foot_points(box[r], z[r], one) for one, r in views])
     return np.where(np.isfinite(at), at, pos)
 

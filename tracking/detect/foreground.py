@@ -34,7 +34,8 @@ from tracking.detect.smoothing import independent_noise, smoothed, window
 LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0
 ASSUMED_HEIGHT = 18.0  # m that the image is assumed to be high while its scale is unknown.
 MOST_FOREGROUND = 0.6  # Share of the image: a frame with more foreground is not measured (ours).
-CHECK_TIME = 1.0  # s from one look at whether the camera moves to the next
+CHECK_TIME = 2.0  # s from one look at whether the camera moves to the next
+WATCH_TIME = 10.0  # s after which looks are at the model anew
 SUSPECT = 0.25  # share of foreground at which it is looked at in each picture
 LEAST_SIGNS = 2  # looks in a row that find a movement
 MOVES = (
@@ -85,7 +86,7 @@ class Foreground:
             sample = np.stack([smoothed(image, self.window) for image in sample])
         self.stabiliser: Stabiliser | None = None
         self._watch: Stabiliser | None = None
-        self._unchecked = self._signs = 0
+        self._unchecked = self._signs = self._watched = 0
         self._step = np.eye(3)
         poses = poses_of_sample(sample) if np.ndim(sample) == 4 and len(sample) > 2 else None
         if poses is not None:
@@ -146,10 +147,11 @@ class Foreground:
     def _moves(self, image: Image, foreground: float) -> bool:
         """Returns whether the camera was found to move in this picture. foreground: share of the picture."""
         self._unchecked += 1
+        self._watched += 1
         if self._unchecked < self._fps * CHECK_TIME and not self._signs and foreground < SUSPECT:
             return False
-        if self._watch is None or self._unchecked >= self._fps * CHECK_TIME:
-            self._watch = Stabiliser(self.model.picture(), self.model.valid, self._fps)
+        if self._watch is None or (self._watched >= self._fps * WATCH_TIME and not self._signs):
+            self._watch, self._watched = Stabiliser(self.model.picture(), self.model.valid, self._fps), 0
         self._unchecked = 0
         self._signs = self._signs + 1 if self._watch.has_moved(image) else 0
         return self._signs >= LEAST_SIGNS
