@@ -7,6 +7,7 @@ run.
 
 from __future__ import annotations
 
+import re
 import shutil
 import time
 from collections.abc import Sequence
@@ -23,6 +24,7 @@ from sim.store.track_files import write_tracks
 from sim.types import Camera, Scene, Tracks
 
 PARTS = "parts"
+OURS = re.compile(r"\d{7,}(-joined)?|\.partial-.*")  # names in that folder
 EVERY = 1.0  # s between two parts
 JOINED = 60  # parts that are made one, so that there are few of them
 
@@ -39,8 +41,13 @@ class TrackParts:
         self.folder, self.fps, self.camera, self.scene = folder, fps, camera, scene
         self.waiting, self.small, self.written = list[Tracks](), list[int](), time.monotonic()
         reject_foreign(folder)
-        (folder / RUN).unlink(missing_ok=True)
+        foreign = next((path for path in _inside(folder) if not OURS.fullmatch(path.name)), None)
+        if foreign is not None:
+            expected, remedy = "no folder parts, or that of a run", "choose another --out"
+            raise InputError(file=foreign, got="a file of another program", expected=expected, remedy=remedy)
+        # in this order, so that a kill in between does not leave parts that belong to another run
         shutil.rmtree(folder / PARTS, ignore_errors=True)
+        (folder / RUN).unlink(missing_ok=True)
 
     def add(self, tracks: Sequence[Tracks], info: dict[str, Any], *, now: bool = False) -> None:
         """Adds the tracks of the next frames. They are written if a second has passed since others were, or `now`.
@@ -77,13 +84,18 @@ class TrackParts:
         write_tracks(path, tracks, fps=self.fps, camera=self.camera, scene=self.scene, info=info)
 
 
+def _inside(folder: Path) -> list[Path]:
+    return sorted((folder / PARTS).iterdir()) if (folder / PARTS).is_dir() else []
+
+
 def _path(folder: Path, first: int) -> Path:
     return folder / PARTS / f"{first:07d}"
 
 
 def has_parts(folder: Path) -> bool:
     """Returns True if a run in the folder was not finished, and left parts."""
-    return (folder / PARTS).is_dir() and not (folder / RUN).exists()
+    inside = _inside(folder)
+    return bool(inside) and all(OURS.fullmatch(path.name) for path in inside) and not (folder / RUN).exists()
 
 
 def read_parts(folder: Path) -> tuple[list[Tracks], dict[str, Any]]:
@@ -91,13 +103,16 @@ def read_parts(folder: Path) -> tuple[list[Tracks], dict[str, Any]]:
     before anybody was seen get the plane of those after."""
     tracks, info = list[Tracks](), dict[str, Any]()
     # a part that is joined comes after the first of those that it was made of, and holds more
-    for path in sorted((folder / PARTS).iterdir(), key=lambda path: (path.name[:7], -len(path.name))):
+    for path in sorted(_inside(folder), key=lambda path: (path.name[:7], -len(path.name))):
         if not (path / RUN).is_file():
             continue  # it was being written
         new = [t for t in read_part(path) if not tracks or t.index > tracks[-1].index]
-        if new and tracks and new[0].index != tracks[-1].index + 1:
+        if not new:
+            continue  # it was joined, and was being removed
+        if tracks and new[0].index != tracks[-1].index + 1:
             break
-        tracks, info = tracks + new, read_run(path)
+        tracks += new
+        info = read_run(path)
     known = next((t for t in reversed(tracks) if len(t.id)), None)
     if known is not None:
         nobody = known.replace(groups=None, events=()).keep(np.zeros(len(known.id), bool))
@@ -115,7 +130,7 @@ def join_parts(folder: Path) -> dict[str, Any]:
     with lock_folder(folder, held=True):
         tracks, info = read_parts(folder)
         if not tracks:
-            remedy = "track again: the run was killed in its first second"
+            remedy = "track again: the run was killed before tracks were stored"
             raise InputError(file=folder, got="no whole part of a run", expected="tracks", remedy=remedy)
         info = {key: value for key, value in info.items() if key not in ("format", "files", "sha256", "boxes")}
         write_tracks(folder, tracks, fps=info["fps"], info={**info, "frames": len(tracks), "ended": "killed"})

@@ -43,6 +43,7 @@ from tracking.running.prepare import Params, PreparedTracker, prepare
 from tracking.running.run_info import run_info
 from tracking.running.time_limit import TimeLimited
 
+MILLISECONDS = 1e11  # times above are no seconds since 1970
 LEARNED = 10.0  # s from which a background is learned, if nothing else is said
 
 
@@ -220,6 +221,9 @@ class Live:
 
     def _index(self, t: float) -> int:
         fps, after = self.sequence.fps, self.index / self.sequence.fps
+        if is_number(t) and t > MILLISECONDS:
+            got, remedy = f"{t:g}, of the year 5138 or later", "divide milliseconds by 1000"
+            raise InputError(place="t", got=got, expected="seconds", remedy=remedy)
         if is_number(t) and not self.index and t > FRAMES / fps:
             self.zero = t  # of a clock that does not begin with the recording
         t = t - self.zero if is_number(t) else t
