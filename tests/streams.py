@@ -39,10 +39,10 @@ def send(
     """Writes these frames to a URL or file. stamps: times, s; None: frame / fps. paced: in the time that they last."""
     with av.open(target, "w", format=format) as container:
         if sound:
-            stream = container.add_stream("mp2", rate=48000)
-            for k in range(20):
-                samples = av.AudioFrame.from_ndarray(np.zeros((1, 2 * 1152), np.int16), "s16", "stereo")
-                samples.rate, samples.pts = 48000, 1152 * k
+            stream = container.add_stream("aac", rate=48000)
+            for k in range(100):
+                samples = av.AudioFrame.from_ndarray(np.zeros((2, 1024), np.float32), "fltp", "stereo")
+                samples.rate, samples.pts = 48000, 1024 * k
                 container.mux(stream.encode(samples))
             container.mux(stream.encode())
             return

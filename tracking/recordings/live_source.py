@@ -243,14 +243,16 @@ class _StreamReader:
         try:
             self.container = av.open(given, options=options, timeout=PATIENCE, metadata_errors="ignore")
         except (av.FFmpegError, OSError, ValueError) as error:
+            if self.file is not None:
+                self.file.close()
             raise self._reason(error) from None
         # A file that is sent by HTTP ends. Of other streams nobody can tell an end from a sender that has died.
         sent_file = source.startswith("http") and self.container.format.name != "mpjpeg"
         self.endless = self.lasts and not sent_file
         streams = self.container.streams.video
         if not streams:
-            self.container.close()
             got = "sound only" if self.container.streams.audio else "no video"
+            self.close()
             raise InputError(file=self.name, got=got, expected="a video stream", remedy="check the address")
         self.stream = streams[0]
         self.stream.thread_count = 1
@@ -351,7 +353,7 @@ def lines_of_boxes(file: BinaryIO) -> Iterator[dict[str, Any]]:
         if not line.strip():
             continue
         found: Any = None
-        with suppress(ValueError):
+        with suppress(ValueError, RecursionError):
             found = json.loads(line) if len(line) <= LINE else None
         wrong = not isinstance(found, dict) or not found.keys() <= keys or found.keys().isdisjoint({"boxes", "points"})
         if wrong:

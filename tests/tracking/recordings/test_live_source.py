@@ -266,7 +266,9 @@ def test_a_slow_consumer_drops_or_lets_the_source_wait(tmp_path):
 def test_files_and_pipes_wait_and_streams_drop(tmp_path):
     path = tmp_path / "video.ts"
     path.write_bytes(sent(range(5)))
-    assert LivePictures(str(path), None, None, 0.1).when_slow == "wait"
+    pictures = LivePictures(str(path), None, None, 0.1)
+    assert pictures.when_slow == "wait"
+    assert len(found(pictures)[0]) == 5
     with http(sent(range(5))) as place:
         assert LivePictures(f"http://{place}", None, None).when_slow == "drop"
 

@@ -181,9 +181,9 @@ class _LiveRun:
         """Tracks a frame that came at a moment of the monotonic clock, and stores what is completed."""
         frame = given.pop("frame", None)
         if frame is not None:
-            reject("t" in given, "stdin", "t and frame", "one of both", "leave one out")
+            reject("t" in given, "", "t and frame", "one of both", "leave one out")
             good = isinstance(frame, int) and not isinstance(frame, bool) and 1 <= frame <= FRAMES
-            reject(not good, "stdin", frame, f"a frame from 1 to {FRAMES}", "count frames from 1", "frame")
+            reject(not good, "", frame, f"a frame from 1 to {FRAMES}", "count frames from 1", "frame")
             given["t"] = (frame - 1) / self.live.sequence.fps
         self._keep(self.live.step(**given).completed)
         self.latency.append(1000 * (time.monotonic() - at))
