@@ -146,7 +146,7 @@ def test_a_lost_stream_keeps_all(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(live_source.LivePictures, "_opened", lambda _: Lost())
     monkeypatch.setattr(live_source, "AGAIN", 0.0)
     monkeypatch.setattr(live_source, "PAUSE", 0.0)
-    words = ["--background", "learn:5", "--px-per-m", "20", "--when-slow", "wait"]
+    words = ["--background", "learn:10", "--px-per-m", "20", "--when-slow", "wait"]
     assert run(["track", "blob", "rtsp://a", "--out", str(tmp_path / "run"), *words]) == 1, capsys.readouterr()
     assert "30 frames that were tracked before are in" in (err := capsys.readouterr().err), err
     info = check_run(tmp_path / "run")
@@ -202,7 +202,6 @@ def test_a_killed_run_is_read_by_all_commands(tmp_path, capsys):
     assert check_run(out)["ended"] == "killed"
     assert len(read_run(out)) == check_run(out)["frames"]
     assert run(["export", "trajnet", str(out), "--out", str(tmp_path / "net")]) == 0
-    assert run(["group", str(out), "--out", str(tmp_path / "grouped")]) == 0
     capsys.readouterr()
 
 
