@@ -12,8 +12,8 @@ points one by one, and is pickled in the middle; the files of its tracks are com
 time of `Live.step`; frames per second are of CPU time, with one thread. memory: resident memory at shares of a run in
 which ten people at a time walk through the view and go, and new ones come; of pictures, 300 rendered ones are played to
 and fro. kill: points of ten people at 10 frames per second go to `flockscope track`, which is killed (SIGKILL) at
-random moments; lost is what had been sent until then, and is not in the tracks that are put together afterwards. stream:
-pictures of our renderer at a loopback address, tracked by `flockscope track blob` on one core.
+random moments; lost is what had been sent until then, and is not in the tracks that are put together afterwards.
+stream: pictures of our renderer at a loopback address, tracked by `flockscope track blob` on one core.
 """
 
 from __future__ import annotations
@@ -300,7 +300,7 @@ def stream(minutes: float, fps: float) -> None:
         port, seconds = str(probe.getsockname()[1]), 60 * minutes
         probe.close()
         program = [sys.executable, *(["-S"] if sys.flags.no_site else []), "-m", "benchmarks.live", "send"]
-        sender = subprocess.Popen([*program, video, port, str(fps), str(seconds + 30)])
+        sender = subprocess.Popen([*program, video, port, str(fps), str(seconds + 30)], stderr=subprocess.DEVNULL)
         time.sleep(5.0)
         words = track_command("blob", f"tcp://127.0.0.1:{port}", "--out", str(out), "--px-per-m", "40", "--json")
         cores = os.sched_getaffinity(0)

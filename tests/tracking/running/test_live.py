@@ -142,9 +142,9 @@ def test_times_that_are_not_exact_lose_no_frame():
 def test_a_long_time_without_frames_is_warned_of(t):
     """As if milliseconds, or the seconds since the machine started, were given."""
     live = tracking.Live("blob", fps=10, px_per_m=60)
+    live.step(boxes=[], t=0.0)
     with pytest.warns(UserWarning, match="t is in seconds from 0"):
-        for k, boxes in walkers(2):
-            live.step(boxes=boxes, t=t * k)
+        live.step(boxes=[], t=t)
 
 
 @pytest.mark.parametrize(
