@@ -82,6 +82,7 @@ def test_many_parts_are_made_few(tmp_path, monkeypatch):
     assert files(tmp_path) == whole(tracks)
 
 
+@pytest.mark.slow
 def test_a_run_killed_between_any_two_changes_of_the_disk_keeps_all_but_its_last_part(tmp_path, monkeypatch):
     """The parts are joined twice, and made one at the end. Each is killed, too."""
     monkeypatch.setattr(track_parts, "JOINED", 3)
