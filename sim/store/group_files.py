@@ -134,14 +134,15 @@ def groups_bytes(frames: Series[Groups | None], first: int, unit: str) -> bytes:
     import pyarrow as pa
 
     known = [g for g in frames if g is not None]
-    axes = AXES[: known[0].pos.shape[1]] if known else AXES[:2]
+    some = [g for g in known if len(g.id)] or known[:1]  # frames without groups may not know the plane
+    axes = AXES[: some[0].pos.shape[1]] if some else AXES[:2]
     counts = [0 if g is None else len(g.id) for g in frames]
     ids = [g.id for g in known]
     members = _lists([g.members for g in known], ids, no_ids())
     columns: tables.Columns = {
         "frame": np.repeat(np.arange(first, first + len(frames), dtype=np.int64), counts),
         "group": joined(ids, kind=np.int64), "members": pa.array(members, pa.list_(pa.int64())),
-        axes: joined((g.pos for g in known), len(axes)), along(axes): joined((g.vel for g in known), len(axes)),
+        axes: joined((g.pos for g in some), len(axes)), along(axes): joined((g.vel for g in some), len(axes)),
         EXTENT: joined((g.extent.reshape(-1, 4) for g in known), 4), "size": joined(g.size for g in known),
         "hull": pa.array(_lists([g.hull for g in known], ids, np.zeros(0)), pa.list_(pa.float64())),
     }  # fmt: skip

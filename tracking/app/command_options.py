@@ -184,8 +184,9 @@ class TrackOptions(SceneOptions, BoxOptions, words="track"):
     follow: float | None = option(
         "Live: read a video while it grows, until it has not for X seconds.", None, low=0, metavar="X")
     stream: bool = option("Live: print each frame's people, groups, events and counts as a line of JSON.", False)
-    when_slow: Literal["drop", "wait"] = option(
-        "Live: a tracker that is slower than the pictures leaves some out, or lets the source wait.", "drop")
+    when_slow: Literal["drop", "wait"] | None = option(
+        "Live: a tracker that is slower than the pictures leaves some out, or lets the source wait. Default: wait for "
+        "pipes and files, else drop.", None)
     workers: int = PROCESSES()
 
 

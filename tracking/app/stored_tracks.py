@@ -106,10 +106,6 @@ def holds_tracks(path: Path) -> bool:
 def find_tracks(path: Path) -> list[StoredTracks]:
     """Returns all stored tracks at or below a path, not read yet, in the order of their paths."""
     got, remedy, found = "no such file or folder", "check the path", list[StoredTracks]()
-    if has_parts(path):
-        info = join_parts(path)
-        words = f"its run was killed; what it had stored, {counted(info['frames'], 'frame')}, is put together"
-        warnings.warn(f"{path}: {words}", stacklevel=2)
     if path.is_file() and path.suffix.lower() in OTHER_FILES:
         got = f"a {path.suffix.lower()} file, no tracks"
     elif path.is_file():
@@ -126,6 +122,10 @@ def find_tracks(path: Path) -> list[StoredTracks]:
 
 
 def _below(folder: Path, depth: int) -> list[StoredTracks]:
+    if has_parts(folder):
+        joined = join_parts(folder)
+        words = f"its run was killed; what it had stored, {counted(joined['frames'], 'frame')}, is put together"
+        warnings.warn(f"{folder}: {words}", stacklevel=2)
     if seal.is_run(folder):
         info = seal.read_run(folder) if (folder / seal.RUN).is_file() else {}
         # what came in live has no name that a sequence could have

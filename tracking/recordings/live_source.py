@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import re
+import select
 import stat
 import threading
 import time
@@ -29,7 +30,9 @@ STDIN = "-"
 PATIENCE = 10.0  # s without an answer, or without a picture, after which a source is lost
 AGAIN = 30.0  # s for which a lost stream is asked again
 PAUSE = 1.0  # s between two tries
+TICK = 0.05  # s between two looks at a pipe or file
 WAITING = 4  # pictures that wait at most for a tracker that is too slow
+EXACT = 1e-3  # frames; stamps are rounded
 LINE = 4 * 2**20  # characters of a line of boxes at most
 WhenSlow = Literal["drop", "wait"]
 
@@ -58,21 +61,24 @@ class LivePictures:
     """The pictures of a camera, stream, pipe or growing file, in the order of their times.
 
     source: as of `is_live`. fps: frames per second; None: as the source says. when_slow: "drop" leaves out pictures
-    that came while the tracker was busy, all but the newest; "wait" lets the source wait. follow: seconds after which a
-    file that does not grow has ended.
+    that came while the tracker was busy, all but the newest; "wait" lets the source wait; None: pipes and files wait.
+    follow: seconds after which a file that does not grow has ended.
 
     State: fps; dropped, reconnects: numbers of pictures left out and of times the stream was opened again.
 
     Raises InputError if there is no such source, or its frame rate is unknown.
     """
 
-    def __init__(self, source: str, fps: float | None, when_slow: WhenSlow, follow: float | None = None) -> None:
-        self.source, self.when_slow, self.follow = source, when_slow, follow
+    def __init__(self, source: str, fps: float | None, when_slow: WhenSlow | None, follow: float | None = None) -> None:
+        self.source, self.name, self.follow = source, hidden(source), follow
+        lasts = source.isdecimal() or ADDRESS.fullmatch(source)
+        self.when_slow: WhenSlow = when_slow or ("drop" if lasts else "wait")
         self.dropped = self.reconnects = 0
         self._queue: deque[LivePicture] = deque()
         self._changed, self._ended, self._stop = threading.Condition(), False, False
         self._error: FlockscopeError | None = None
         self._size: tuple[int, ...] | None = None
+        self._seen = time.monotonic()  # when the last picture came
         self._reader = self._opened()
         found = fps or self._reader.fps
         if found is None or not FRAME_RATES[0] <= found <= FRAME_RATES[1]:
@@ -102,6 +108,7 @@ class LivePictures:
                 yield picture
         finally:
             self._stop = True
+            self._reader.stop()
             with self._changed:
                 self._changed.notify_all()
             self._thread.join(PATIENCE)
@@ -114,7 +121,7 @@ class LivePictures:
         return _StreamReader(self.source, self.follow)
 
     def _read(self) -> None:
-        begun, base, last = time.monotonic(), 0.0, -1.0
+        begun, base, last = time.monotonic(), 0.0, -1
         try:
             while not self._stop:
                 first: float | None = None
@@ -122,10 +129,13 @@ class LivePictures:
                     for stamp, image in self._reader.pictures():
                         now = time.monotonic()
                         first = stamp if first is None else first
-                        t = base + (stamp - first)
-                        if t > last:  # pictures out of order, or of one time, are left out
-                            last = t
-                            self._put(LivePicture(t, self._checked(image), now))
+                        self._seen = now
+                        at = (base + (stamp - first)) * self.fps
+                        # Times are not exact: a picture after the last frame gets the next one, even if it is early.
+                        # Pictures out of order, and those that there is no frame for, are left out.
+                        if at > last + EXACT:
+                            last = max(round(at), last + 1)
+                            self._put(LivePicture(last / self.fps, self._checked(image), now))
                         else:
                             self.dropped += 1
                         if self._stop:
@@ -135,12 +145,12 @@ class LivePictures:
                     if not self._reader.lasts:
                         raise
                     self._again(lost)
-                    base = max(time.monotonic() - begun, last + 1 / self.fps)
+                    base = max(time.monotonic() - begun, (last + 1) / self.fps)
         except FlockscopeError as error:
             self._error = error
         except Exception as error:  # a thread must not end without a word
             got = f"{type(error).__name__}: {error}"
-            self._error = WorkError(file=self.source, got=got, expected="pictures", remedy="report it: it is a bug")
+            self._error = WorkError(file=self.name, got=got, expected="pictures", remedy="report it: it is a bug")
         finally:
             with suppress(Exception):
                 self._reader.close()
@@ -152,7 +162,7 @@ class LivePictures:
         """Opens a stream that was lost again. Raises the loss if that does not work for some time."""
         with suppress(Exception):
             self._reader.close()
-        until = time.monotonic() + AGAIN
+        until = max(self._seen + AGAIN, time.monotonic() + PAUSE)
         while not self._stop and time.monotonic() < until:
             time.sleep(PAUSE)
             with suppress(InputError, WorkError):
@@ -178,11 +188,11 @@ class LivePictures:
         if image.shape != self._size:
             got, expected = ("{1}×{0} px".format(*size) for size in (image.shape, self._size))
             remedy = "what was tracked is kept; track the rest as a run of its own"
-            raise InputError(file=self.source, got=f"pictures that change to {got}", expected=expected, remedy=remedy)
+            raise InputError(file=self.name, got=f"pictures that change to {got}", expected=expected, remedy=remedy)
         return image
 
     def _refused(self, got: str, expected: str, remedy: str) -> InputError:
-        return InputError(file=self.source, got=got, expected=expected, remedy=remedy)
+        return InputError(file=self.name, got=got, expected=expected, remedy=remedy)
 
 
 class _CameraReader:
@@ -211,6 +221,9 @@ class _CameraReader:
                 raise WorkError(file=str(self.number), got="no picture", expected="a camera", remedy=remedy)
             yield time.monotonic(), np.asarray(image, np.uint8)
 
+    def stop(self) -> None:
+        pass  # the next picture comes soon
+
     def close(self) -> None:
         self.camera.release()
 
@@ -221,24 +234,32 @@ class _StreamReader:
     def __init__(self, source: str, follow: float | None) -> None:
         import av
 
-        self.source, self.lasts = source, bool(ADDRESS.fullmatch(source))
-        options = {"rtsp_transport": "tcp", "fflags": "nobuffer"} if self.lasts else {}
-        given: Any = source if self.lasts else _file(source, follow)
+        self.name, self.lasts = hidden(source), bool(ADDRESS.fullmatch(source))
+        options = {"rtsp_transport": "tcp"} if self.lasts else {}
+        if self.lasts and not source.startswith("http"):
+            options["fflags"] = "nobuffer"  # begins with the newest picture; a file that is sent begins with its first
+        self.file = None if self.lasts else _Growing(Path(source), follow or 0.0)
+        given: Any = source if self.file is None else self.file
         try:
             self.container = av.open(given, options=options, timeout=PATIENCE, metadata_errors="ignore")
         except (av.FFmpegError, OSError, ValueError) as error:
+            if self.file is not None:
+                self.file.close()
             raise self._reason(error) from None
+        # A file that is sent by HTTP ends. Of other streams nobody can tell an end from a sender that has died.
+        sent_file = source.startswith("http") and self.container.format.name != "mpjpeg"
+        self.endless = self.lasts and not sent_file
         streams = self.container.streams.video
         if not streams:
-            self.container.close()
             got = "sound only" if self.container.streams.audio else "no video"
-            raise InputError(file=source, got=got, expected="a video stream", remedy="check the address")
+            self.close()
+            raise InputError(file=self.name, got=got, expected="a video stream", remedy="check the address")
         self.stream = streams[0]
         self.stream.thread_count = 1
         width, height = self.stream.codec_context.width, self.stream.codec_context.height
         if width and not fits_picture(width, height):
             got = f"{width}×{height} px"
-            raise InputError(file=source, got=got, expected=PICTURE_SIZES, remedy="take a smaller stream")
+            raise InputError(file=self.name, got=got, expected=PICTURE_SIZES, remedy="take a smaller stream")
         rate = self.stream.average_rate or self.stream.guessed_rate
         self.fps = float(rate) if rate else None
 
@@ -256,13 +277,23 @@ class _StreamReader:
                 t = frame.time if frame.time is not None else count / (self.fps or 1.0)
                 yield float(t), picture_of(frame, self.stream.sample_aspect_ratio)
         except av.EOFError:
-            return
+            pass
         except (av.FFmpegError, OSError) as error:
             lost = self._reason(error)
-            raise WorkError(file=self.source, got=lost.got, expected=lost.expected, remedy=lost.remedy) from None
+            raise WorkError(file=self.name, got=lost.got, expected=lost.expected, remedy=lost.remedy) from None
+        if self.endless:
+            remedy = "check that the sender runs; what was tracked is kept"
+            raise WorkError(file=self.name, got="the end of the stream", expected="more pictures", remedy=remedy)
+
+    def stop(self) -> None:
+        """Ends a wait for what a pipe or file has not yet."""
+        if self.file is not None:
+            self.file.stopped = True
 
     def close(self) -> None:
         self.container.close()
+        if self.file is not None:
+            self.file.close()
 
     def _reason(self, error: Exception) -> InputError:
         import av
@@ -273,31 +304,41 @@ class _StreamReader:
             got, remedy = f"no right to see it ({text})", "give name and password: rtsp://NAME:PASSWORD@HOST/…"
         elif isinstance(error, av.ExitError | TimeoutError) or "timed out" in text.lower():
             got = f"no answer within {PATIENCE:g} s"
-        return InputError(file=hidden(self.source), got=got, expected="a stream of pictures", remedy=remedy)
+        return InputError(file=self.name, got=got, expected="a stream of pictures", remedy=remedy)
 
 
 def hidden(source: str) -> str:
-    """Returns an address without its password."""
-    return re.sub(r"(://[^/:@]*):[^/@]*@", r"\1:***@", source)
-
-
-def _file(source: str, follow: float | None) -> Any:
-    if follow is None:
+    """Returns an address without its password, and without the values after ?, which may be passwords, too."""
+    if not ADDRESS.fullmatch(source):
         return source
-    return _Growing(Path(source).open("rb"), follow)
+    return re.sub(r"\?.*", "?***", re.sub(r"(://[^/:@]*):[^/]*@", r"\1:***@", source))
 
 
 class _Growing:
-    """A file that is read while it grows: it ends once it has not grown for some seconds."""
+    """A pipe, or a file that is read while it grows: it ends once it has not grown for some seconds. A pipe that has a
+    writer does not end, however long the writer pauses.
 
-    def __init__(self, file: BinaryIO, seconds: float) -> None:
-        self.file, self.seconds = file, seconds
+    State: stopped, True if it shall end now. Raises InputError if it cannot be opened.
+    """
+
+    def __init__(self, path: Path, seconds: float) -> None:
+        try:
+            # without a buffer, which would wait until it is full
+            self.file = path.open("rb", buffering=0)
+        except OSError as error:
+            remedy = "check path and rights"
+            raise InputError(file=path, got=error.strerror or "", expected="a file", remedy=remedy) from None
+        self.seconds, self.stopped = seconds, False
 
     def read(self, size: int = -1) -> bytes:
         until = time.monotonic() + self.seconds
-        while not (found := self.file.read(size)) and time.monotonic() < until:
-            time.sleep(0.05)
-        return found
+        while not self.stopped:
+            if select.select([self.file], [], [], TICK)[0]:
+                found = self.file.read(size)
+                if found or time.monotonic() >= until:
+                    return found or b""
+                time.sleep(TICK)
+        return b""
 
     def close(self) -> None:
         self.file.close()
@@ -312,7 +353,7 @@ def lines_of_boxes(file: BinaryIO) -> Iterator[dict[str, Any]]:
         if not line.strip():
             continue
         found: Any = None
-        with suppress(ValueError):
+        with suppress(ValueError, RecursionError):
             found = json.loads(line) if len(line) <= LINE else None
         wrong = not isinstance(found, dict) or not found.keys() <= keys or found.keys().isdisjoint({"boxes", "points"})
         if wrong:

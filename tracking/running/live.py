@@ -9,6 +9,7 @@ nothing in it looks ahead. What is unknown is learned from the first frames:
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from collections.abc import Sequence as SequenceOf
 from dataclasses import dataclass, replace
@@ -47,6 +48,8 @@ from tracking.running.prepare import PICTURED, Params, PreparedTracker, prepare
 from tracking.running.run_info import run_info
 from tracking.running.time_limit import TimeLimited
 
+GAP = 15.0  # s without frames, after which a warning says so
+MILLISECONDS = 1e11  # times above are no seconds since 1970
 LEARNED = 10.0  # s from which a background is learned, if nothing else is said
 
 
@@ -205,6 +208,11 @@ class Live:
         index = self.index + 1 if t is None else self._index(t)
         lost = [Frame(k, (k - 1) / self.sequence.fps) for k in range(self.index + 1, index)]
         frame = self._frame(index, image, right, boxes, points, scores)
+        if len(lost) > GAP * self.sequence.fps:
+            words = (
+                f"no frames for {len(lost) / self.sequence.fps:g} s before t = {frame.t:g} s; t is in seconds from 0"
+            )
+            warnings.warn(f"{self.sequence.name}: {words}", UserWarning, stacklevel=2)
         if lost:
             self.unobserved.append((lost[0].index, lost[-1].index))
         completed = [tracks for each in (*lost, frame) for tracks in self._take(each)]
@@ -234,6 +242,9 @@ class Live:
 
     def _index(self, t: float) -> int:
         fps, after = self.sequence.fps, self.index / self.sequence.fps
+        if is_number(t) and t > MILLISECONDS:
+            got, remedy = f"{t:g}, of the year 5138 or later", "divide milliseconds by 1000"
+            raise InputError(place="t", got=got, expected="seconds", remedy=remedy)
         if is_number(t) and not self.index and t > FRAMES / fps:
             self.zero = t  # of a clock that does not begin with the recording
         t = t - self.zero if is_number(t) else t
@@ -242,6 +253,8 @@ class Live:
                 place="t", got=repr(t), expected="seconds since the first frame", remedy="subtract its time"
             )
         index = round(t * fps) + 1
+        if index <= self.index < t * fps + 1:
+            index = self.index + 1  # times are not exact: a frame after the last one, but early, is the next
         if index <= self.index:
             got = f"{t:g} s, frame {index}"
             remedy = "give frames in the order of their times, at most one in each 1/fps"

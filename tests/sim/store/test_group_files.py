@@ -9,8 +9,9 @@ from scenarios.errors import InputError
 from sim.scene.camera import camera_rotation
 from sim.store.camera_files import camera_document, read_camera, read_scene, scene_document
 from sim.store.group_files import read_events, read_groups_csv, read_near, read_script
-from sim.types import Box, Camera, Scene
-from tests.made_up import make_sequence, same
+from sim.store.track_files import tracks_files
+from sim.types import Box, Camera, Groups, Scene
+from tests.made_up import make_sequence, make_tracks, same
 
 EVENT = {"kind": "merge", "start": 1, "end": 3, "emitted": None, "before": [-1, 2], "after": [2], "members": [1, 2],
          "pos": [1.5, None]}  # fmt: skip
@@ -98,3 +99,18 @@ def test_cameras_and_scenes_come_back_exactly(tmp_path):
     for scene in (Scene(np.array([3.0, 4.0])), make_sequence(1).scene, boxes):
         (tmp_path / "scene.json").write_text(json.dumps(scene_document(scene)))
         same(scene, read_scene(tmp_path / "scene.json"))
+
+
+def test_first_frames_without_groups_know_no_plane():
+    """As of a tracker in space, before anybody is there."""
+    deep = [with_z(t) for t in make_tracks(1, 6, "space")]
+    first = deep[0].keep(np.zeros(len(deep[0].id), bool)).replace(groups=Groups.none())
+    assert "groups.parquet" in tracks_files([first, *deep[1:]], fps=10.0)
+
+
+def with_z(t):
+    """The tracks with groups in space."""
+    if t.groups is None:
+        return t
+    pos, vel = (np.pad(a, ((0, 0), (0, 1))) for a in (t.groups.pos, t.groups.vel))
+    return t.replace(groups=t.groups.replace(pos=pos, vel=vel))

@@ -141,6 +141,23 @@ def test_a_clock_that_does_not_begin_at_zero():
     assert now.index == 20
 
 
+def test_times_that_are_not_exact_lose_no_frame():
+    live = tracking.Live("blob", fps=10, px_per_m=60)
+    for k, boxes in walkers(40):
+        now = live.step(boxes=boxes, t=k / 10 + 0.04 * (-1) ** (k // 2))
+    assert abs(now.index - 41) <= 1
+    assert sum(last - first + 1 for first, last in live.unobserved) <= 2
+
+
+@pytest.mark.parametrize("t", [40.0, 400.0])
+def test_a_long_time_without_frames_is_warned_of(t):
+    """As if milliseconds, or the seconds since the machine started, were given."""
+    live = tracking.Live("blob", fps=10, px_per_m=60)
+    live.step(boxes=[], t=0.0)
+    with pytest.warns(UserWarning, match="t is in seconds from 0"):
+        live.step(boxes=[], t=t)
+
+
 @pytest.mark.parametrize(
     ("steps", "words"),
     [
@@ -152,6 +169,7 @@ def test_a_clock_that_does_not_begin_at_zero():
         ([{"boxes": []}, {"image": np.zeros((4, 4, 3), np.uint8)}], "picture"),
         ([{"image": np.zeros((4, 4), np.uint8)}], "image"),
         ([{"boxes": [], "t": float("nan")}], "t: got nan"),
+        ([{"boxes": [], "t": 1.7e12}], "divide milliseconds by 1000"),
     ],
 )
 def test_a_wrong_frame_is_named(steps, words):

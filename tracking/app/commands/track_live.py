@@ -11,7 +11,7 @@ import time
 import warnings
 from collections import deque
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, closing, contextmanager, nullcontext
+from contextlib import ExitStack, closing, contextmanager, nullcontext, suppress
 from typing import Any
 
 import numpy as np
@@ -31,7 +31,8 @@ from tracking.recordings.video import DEFAULT_FPS
 from tracking.running.live import Live
 
 FILES_ALONE = ("boxes", "person_class", "box_scale", "min_score", "detections")
-LIVE_ALONE = ("follow", "stream")
+LIVE_ALONE = ("follow", "stream", "when_slow")
+Given = tuple[dict[str, Any], float]  # the arguments of Live.step for a frame, and when it came
 LATENCIES = 10_000  # frames whose latency is kept
 
 
@@ -39,45 +40,51 @@ def refuse_live_options(options: TrackOptions) -> None:
     """Raises InputError if options are given that have an effect on live sources only."""
     for name in LIVE_ALONE:
         if getattr(options, name):
-            expected, remedy = "a camera, address or pipe; with --follow a video file", f"leave --{name} out"
-            raise InputError(place=f"--{name}", got=options.source, expected=expected, remedy=remedy)
+            expected, remedy = "a camera, address or pipe; with --follow a video file", f"leave {_flag(name)} out"
+            raise InputError(place=_flag(name), got=options.source, expected=expected, remedy=remedy)
+
+
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
 
 
 def track_live(setup: TrackerSetup, options: TrackOptions) -> CommandResult:
     """Tracks what comes in until it ends, or until Ctrl-C, and returns a line for it. All that was tracked is stored,
     also if the source is lost."""
     for name in FILES_ALONE:
-        place = f"--{name.replace('_', '-')}"
+        place = _flag(name)
         reject(getattr(options, name) is not None, "", options.source, "a recording", f"leave {place} out", place)
+    for name in ("follow", "when_slow") if options.source == STDIN else ():
+        place = _flag(name)
+        reject(getattr(options, name) is not None, "", options.source, "pictures", f"leave {place} out", place)
     with ExitStack() as stack:
         stack.enter_context(lock_folder(options.out))
         check_place(options.out, setup.tracker)
         stack.enter_context(setup.limited or nullcontext())
-        stopped = stack.enter_context(_stopped_by_signals())
+        stop = stack.enter_context(_stopped_by_signals())
         pictures = None
         if options.source != STDIN:
-            pictures = LivePictures(options.source, options.fps, options.when_slow, options.follow)
+            with stop.waiting():
+                pictures = LivePictures(options.source, options.fps, options.when_slow, options.follow)
         run = _LiveRun(setup, options, options.fps or _usual_rate() if pictures is None else pictures.fps, pictures)
         error = None
         try:
-            for number, (given, at) in enumerate(_given(pictures), 1):
-                if stopped:
-                    break
+            for number, (given, at) in enumerate(stop.before_end(_given(pictures)), 1):
                 with _naming("stdin" if pictures is None else "", number):
                     run.step(given, at)
         except FlockscopeError as lost:
             error = lost
-        row = run.finish("stopped" if stopped else "ended" if error is None else "lost")
+        row = run.finish("stopped" if stop.found else "ended" if error is None else "lost")
     if error is not None:
         if row["frames"]:
             kept = f"{counted(row['frames'], 'frame')} that were tracked before are in {options.out}"
             warnings.warn(kept, UserWarning, stacklevel=2)
         raise error
-    code = INTERRUPTED if stopped else 0
+    code = INTERRUPTED if stop.found else 0
     return CommandResult({"tracker": setup.tracker, "runs": [row]}, "" if options.stream else _line(row), code)
 
 
-def _given(pictures: LivePictures | None) -> Iterator[tuple[dict[str, Any], float]]:
+def _given(pictures: LivePictures | None) -> Iterator[Given]:
     """Yields the arguments of `Live.step` for each frame, and when it came, by the monotonic clock."""
     if pictures is None:
         for line in lines_of_boxes(sys.stdin.buffer):
@@ -103,17 +110,54 @@ def _usual_rate() -> float:
     return DEFAULT_FPS
 
 
+class _Stop:
+    """The handler of the signals that end a run. A wait for the source is broken off, a step of the tracker is not.
+
+    State: found, True once there was a signal; waits, True while a signal raises KeyboardInterrupt.
+    """
+
+    def __init__(self) -> None:
+        self.found = self.waits = False
+
+    def __call__(self, *_: Any) -> None:
+        self.found = True
+        if self.waits:
+            self.waits = False
+            raise KeyboardInterrupt
+
+    @contextmanager
+    def waiting(self) -> Iterator[None]:
+        """Lets a signal break off the block."""
+        self.waits = True
+        try:
+            if self.found:
+                raise KeyboardInterrupt
+            yield
+        finally:
+            self.waits = False
+
+    def before_end(self, items: Iterator[Given]) -> Iterator[Given]:
+        """Yields the items until there is a signal."""
+        with suppress(KeyboardInterrupt):
+            while True:
+                with self.waiting():
+                    item = next(items, None)
+                if item is None:
+                    return
+                yield item
+
+
 @contextmanager
-def _stopped_by_signals() -> Iterator[list[int]]:
-    """Yields a list, which is empty until the process is told to end (Ctrl-C, SIGTERM)."""
-    found: list[int] = []
+def _stopped_by_signals() -> Iterator[_Stop]:
+    """Yields what says whether the process was told to end (Ctrl-C, SIGTERM)."""
+    stop = _Stop()
     kinds = (signal.SIGINT, signal.SIGTERM)
     if threading.current_thread() is not threading.main_thread():
-        yield found
+        yield stop
         return
-    before = [signal.signal(kind, lambda number, _: found.append(number)) for kind in kinds]
+    before = [signal.signal(kind, stop) for kind in kinds]
     try:
-        yield found
+        yield stop
     finally:
         for kind, handler in zip(kinds, before, strict=True):
             signal.signal(kind, handler)
@@ -137,9 +181,9 @@ class _LiveRun:
         """Tracks a frame that came at a moment of the monotonic clock, and stores what is completed."""
         frame = given.pop("frame", None)
         if frame is not None:
-            reject("t" in given, "stdin", "t and frame", "one of both", "leave one out")
+            reject("t" in given, "", "t and frame", "one of both", "leave one out")
             good = isinstance(frame, int) and not isinstance(frame, bool) and 1 <= frame <= FRAMES
-            reject(not good, "stdin", frame, f"a frame from 1 to {FRAMES}", "count frames from 1", "frame")
+            reject(not good, "", frame, f"a frame from 1 to {FRAMES}", "count frames from 1", "frame")
             given["t"] = (frame - 1) / self.live.sequence.fps
         self._keep(self.live.step(**given).completed)
         self.latency.append(1000 * (time.monotonic() - at))
