@@ -26,7 +26,7 @@ from sim.types import Camera, Scene, Tracks
 
 PARTS = "parts"
 OURS = re.compile(r"\d{7,}(-joined)?|\.partial-.*")  # names in that folder
-EVERY = 1.0  # s between two parts
+EVERY = 0.5  # s between two parts
 JOINED = 60  # parts that are made one, so that there are few of them
 
 
@@ -46,12 +46,15 @@ class TrackParts:
         if foreign is not None:
             expected, remedy = "no folder parts, or that of a run", "choose another --out"
             raise InputError(file=foreign, got="a file of another program", expected=expected, remedy=remedy)
+        if has_parts(folder):
+            remedy = "score or view it, which makes a run of it, or choose another --out"
+            raise InputError(file=folder, got="what a killed run has kept", expected="no such run", remedy=remedy)
         # in this order, so that a kill in between does not leave parts that belong to another run
         _remove(_inside(folder))
         (folder / RUN).unlink(missing_ok=True)
 
     def add(self, tracks: Sequence[Tracks], info: dict[str, Any], *, now: bool = False) -> None:
-        """Adds the tracks of the next frames. They are written if a second has passed since others were, or `now`.
+        """Adds the tracks of the next frames. They are written if half a second has passed since others were, or `now`.
         info: what run.json says so far."""
         self.waiting += tracks
         if not self.waiting or not (now or time.monotonic() - self.written >= EVERY):

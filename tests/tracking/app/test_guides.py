@@ -178,7 +178,8 @@ def test_commands_of_the_readme(tmp_path, monkeypatch, capsys):
     write_video(tmp_path / "street.mp4", [picture(k) for k in range(110)])
     (tmp_path / "walks.csv").write_text("".join(f"{k},{p},{k / 10},{p}\n" for k in range(1, 111) for p in (1, 2)))
     (tmp_path / "det.txt").write_text("".join(f"{k},-1,{k / 2},20,16,40,0.9\n" for k in range(1, 111)))
-    lines = [line for block in blocks("") for line in block.splitlines() if line.startswith("flockscope ") and "rtsp:" not in line]
+    lines = [line for block in blocks("") for line in block.splitlines() if line.startswith("flockscope ")]
+    lines = [line for line in lines if "rtsp:" not in line]
     assert len(lines) >= 6
     for line in lines:
         words = shlex.split(line, comments=True)[1:]
