@@ -104,7 +104,7 @@ def columns(folder: Path) -> set[str]:
     run = track("blob", sequence, detections="file")
     run.write(folder / "run", sequence)
     files = {name for path in folder.rglob("*.parquet") for name in pq.read_schema(path).names}
-    tables = {name for table in vars(run.tables()).values() for name in table.columns}
+    tables = {name for table in run.tables().named().values() for name in table.columns}
     return {name for name in files if not name.startswith("cov_")} | tables
 
 

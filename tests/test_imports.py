@@ -41,7 +41,7 @@ def test_a_listing_of_scenarios_does_without_arrays_of_the_world():
 LAZY_NAMES = [
     ("sim", ["replay", "simulate"]),
     ("scenarios", ["load", "sensor_settings"]),
-    ("tracking", ["compare", "evaluate", "group", "track", "tune"]),
+    ("tracking", ["Live", "compare", "evaluate", "group", "track", "tune"]),
 ]
 
 

@@ -64,7 +64,7 @@ def validate(table: Table, file: object = "", places: dict[KeyPath, str] | None 
 
 def path_of(loc: KeyPath) -> KeyPath:
     """Returns the path in a scenario's table of a location in pydantic's errors, which names kinds of values, too."""
-    kinds = loc[0] == "event" or loc[:2] == ("camera", "motion")
+    kinds = loc[:1] == ("event",) or loc[:2] == ("camera", "motion")
     return tuple(s for k, s in enumerate(loc) if s not in TAGS and not (k == 2 and kinds))
 
 

@@ -160,7 +160,7 @@ class TrackOptions(SceneOptions, BoxOptions, words="track"):
     tracker: str = ARGUMENT("Name of a tracker, or file.py:Class, or module:Class.", metavar="TRACKER")
     source: str = option(
         "Sequence or dataset, as for other commands; or live: a camera's number, an address (rtsp://…, http://…), a "
-        "pipe, a growing video with --follow, or - for boxes as lines of JSON.", metavar="SOURCE|LIVE", flag="")
+        "pipe, a growing video with --follow, or - for boxes as lines of JSON.", metavar="SOURCE", flag="")
     out: Path = OUT()
     params: str | None = option(
         "The tracker's parameters: a file, or a preset such as paper.", None, metavar="FILE.toml|PRESET")

@@ -17,13 +17,13 @@ import numpy as np
 
 from sim.types import Array
 
-LEAST_BOXES, LEAST_SHARE = 3, 0.6  # boxes that share a difference, in number and as a share of those with any
+LEAST_BOXES, LEAST_SHARE = 5, 0.6  # boxes that share a difference, in number and as a share of those with any
 REACH = 1.2  # heights: boxes so near each other are compared
 ALIKE = 0.25  # largest difference of the logarithms of their heights
 SHARED = 0.12  # heights within which differences are shared
 ACCELERATION, SPEED = 5.0, 5.0  # m/s² and m/s that people do not reach together
 ERRORS = 4.0  # standard errors beyond which a difference is not by chance
-LEAST_SIGNS, MEMORY = 3, 3.0  # frames that show a movement, within s
+LEAST_SIGNS, MEMORY = 5, 3.0  # frames that show a movement, within s
 
 
 class BoxMotion:

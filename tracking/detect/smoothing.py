@@ -2,9 +2,9 @@
 
 In low light most of a picture's noise is independent from pixel to pixel. A mean over n x n pixels divides its
 standard deviation by n, and blurs the outlines of people by as much. So n is 1 unless the noise of the sample is above
-QUIET, and the least odd number, up to WIDEST, with which it is not. The noise is measured in the change from one frame
-of the sample to the next, of a pixel less its right neighbour: moving people cover few pixels, and changes of light
-are the same at both.
+QUIET, and the least odd number, up to WIDEST, with which it is not; pictures of mere noise stay as they are. The noise
+is measured in the change from one frame of the sample to the next, of a pixel less its right neighbour: moving people
+cover few pixels, and changes of light are the same at both.
 """
 
 from __future__ import annotations
@@ -34,8 +34,9 @@ def independent_noise(sample: Image) -> float:
 
 
 def window(noise: float) -> int:
-    """Returns the side (px) of the window over which pictures of this noise (grey levels) are averaged; 1: none."""
-    return next((n for n in range(1, WIDEST, 2) if noise <= n * QUIET), WIDEST)
+    """Returns the side (px) of the window over which pictures of this noise (grey levels) are averaged; 1: none, also
+    if even the widest window leaves too much."""
+    return next((n for n in range(1, WIDEST + 1, 2) if noise <= n * QUIET), 1)
 
 
 def smoothed(image: Image, side: int) -> Image:

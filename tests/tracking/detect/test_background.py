@@ -80,7 +80,7 @@ def test_a_pixel_with_one_channel_that_never_keeps_its_level_has_no_background(c
 
 @pytest.mark.parametrize("background", ["adaptive", "trained"])
 def test_five_classes_of_known_colours(background, monkeypatch):
-    monkeypatch.setattr(Background, "_estimate_gain", lambda self, _: self.gain)
+    monkeypatch.setattr(Background, "_estimate_gain", lambda self, *_: self.gain)
     mean = np.broadcast_to(np.array([90.0, 100.0, 110.0]), (30, 50, 3))
     made = model(mean, background=background)
     scales = np.repeat([1.0, 0.6, 0.2, 1.1, 2.3], 10)

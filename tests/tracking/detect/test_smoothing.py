@@ -33,7 +33,7 @@ def test_one_frame_or_column_has_no_noise() -> None:
 
 
 def test_the_window_grows_with_the_noise() -> None:
-    assert [window(noise) for noise in (0.0, 6.0, 6.1, 18.0, 18.1, 90.0)] == [1, 1, 3, 3, 5, 5]
+    assert [window(noise) for noise in (0.0, 6.0, 6.1, 18.0, 18.1, 30.0, 30.1)] == [1, 1, 3, 3, 5, 5, 1]
 
 
 def test_smoothing_is_a_mean_and_none_of_quiet_pictures() -> None:

@@ -205,7 +205,7 @@ def reported(pos, partitions, log_odds=1.0, measured=1000):
         parts, every = partitions.get(t, parts), np.ones(len(there), bool)
         report._lasting = Mock(return_value=[frozenset(p) for p in parts])
         report.belief = Mock(log_odds=np.full((len(there),) * 2, log_odds), seen=every.copy)
-        report.add(there + 11, place[there], every & (t < measured))
+        report.add(t + 1, there + 11, place[there], every & (t < measured))
         out += report.events({}, 2.0)
     return out
 
@@ -265,6 +265,6 @@ def test_who_is_missed_stays_in_the_group(measured, kinds):
     pos[:, :, 0] = np.arange(100)[:, None] / FPS
     report.belief.add(np.concatenate([pos[0], [[1.0, 0.0]] * 2], axis=1))
     for t in range(100):
-        report.add(np.array([1, 2]), pos[t], np.array([True, t < measured]))
+        report.add(t + 1, np.array([1, 2]), pos[t], np.array([True, t < measured]))
         out += report.events({}, 1.0)
     assert [e.kind for e in out] == kinds

@@ -14,10 +14,11 @@ from tracking.papers.stereo.picture_points import PicturePoints, moved_away
 FPS = 10.0
 
 
+@pytest.mark.filterwarnings("ignore:.*mostly foreground:UserWarning")
 def test_a_picture_that_stays_bright_becomes_background(monkeypatch: pytest.MonkeyPatch) -> None:
     """All of it is foreground at first."""
     monkeypatch.setattr("tracking.detect.background.FOREGROUND_SLOWER", 1.0)
-    monkeypatch.setattr("tracking.detect.background.Background._estimate_gain", lambda self, _: self.gain)
+    monkeypatch.setattr("tracking.detect.background.Background._estimate_gain", lambda self, *_: self.gain)
     camera, r = rig(40.0), np.random.default_rng(0)
     width, height = camera.image
 
