@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scenarios.errors import InputError, reject
+from scenarios.errors import reject
 from scenarios.limits import COORDINATE
 from sim.scene.camera import project, require_camera
 from sim.store.numeric_text import NumericTable, is_number_text, read_rows
@@ -66,37 +66,45 @@ def read_points(path: Path) -> NumericTable:
 def camera_of_points(points: NumericTable, image: tuple[int, int]) -> PointFit:
     """Returns the camera that sees the points. image: width and height of the picture, px. Raises InputError if the
     points do not determine it, or no camera sees them so."""
-    uv, xy = points.values[:, :2], points.values[:, 2:]
-    size, file = np.array(image, float), points.file
+    uv, xy, size = points.values[:, :2], points.values[:, 2:], np.array(image, float)
+    _require_area(points, image)
+    middle = xy.mean(axis=0)
+    rotation, shift, focal = _fitted(uv, xy - middle, size)
+    position = -rotation.T @ shift + [*middle, 0.0]
+    camera = Camera("pinhole", image, (focal, focal), (image[0] / 2, image[1] / 2), position, rotation)
+    seen, _ = project(camera, np.column_stack([xy, np.zeros(len(xy))]))
+    residual = np.sqrt(((seen - uv) ** 2).sum(axis=1))
+    fit = PointFit(camera, residual, *_deviations(xy - middle, rotation, shift, focal, residual))
+    _require_fit(fit, points)
+    return fit
+
+
+def _require_area(points: NumericTable, image: tuple[int, int]) -> None:
+    uv, xy, file = points.values[:, :2], points.values[:, 2:], points.file
     remedy = "add points that are spread over the ground"
     reject(len(uv) < LEAST, file, f"{len(uv)} points", f"{LEAST} or more, better 6", remedy, "points")
-    outside = ((uv < 0) | (uv > size)).any(axis=1)
+    outside = ((uv < 0) | (uv > image)).any(axis=1)
     points.reject(outside, "a point in the picture of {} × {} px".format(*image), "correct u and v, in px")
     for where, at in (("picture", uv), ("ground", xy)):
         wrong = _on_line(at)
         reject(wrong, file, f"points on one line on the {where}", "points that span an area", remedy, "points")
-    rotation, shift, focal = _fitted(uv, xy - xy.mean(axis=0), size)
-    position = -rotation.T @ shift + [*xy.mean(axis=0), 0.0]
-    camera = Camera("pinhole", image, (focal, focal), (image[0] / 2, image[1] / 2), position, rotation)
-    seen, _ = project(camera, np.column_stack([xy, np.zeros(len(xy))]))
-    residual = np.sqrt(((seen - uv) ** 2).sum(axis=1))
-    fit = PointFit(camera, residual, *_deviations(uv, xy - xy.mean(axis=0), rotation, shift, focal, size, residual))
-    open_focal = not fit.focal_sd <= OPEN * focal
-    expected = f"points that tell it to {OPEN:.0%}"
-    got = "points that leave the focal length open"
-    reject(open_focal, file, got, expected, "add points nearer and farther; no three on a line", "points")
-    worst = int(np.nan_to_num(residual, nan=np.inf).argmax())
-    got = f"a point {residual[worst]:.0f} px from where the best camera sees it ({fit.rms:.0f} px in the mean of all)"
-    got = got if np.isfinite(residual[worst]) else "a point behind the camera that fits best"
-    expected = f"points that one camera sees, to {FARTHEST * size[0]:.0f} px in the mean"
-    wrong = not fit.rms <= FARTHEST * size[0]
-    place = f"line {points.line[worst]}"
-    reject(wrong, file, got, expected, "correct the row, or its columns: u,v px, x,y m; y left of x", place)
-    below = not position[2] > 0
+
+
+def _require_fit(fit: PointFit, points: NumericTable) -> None:
+    """Raises InputError if the camera does not see the points, if they leave it open, or if it cannot be used."""
+    file, focal, most = points.file, fit.camera.focal_px[0], FARTHEST * fit.camera.image[0]
+    worst = int(np.nan_to_num(fit.residual, nan=np.inf).argmax())
+    far = f"a point {fit.residual[worst]:.0f} px from where the best camera sees it ({fit.rms:.0f} px in the mean)"
+    got = far if np.isfinite(fit.residual[worst]) else "a point behind the camera that fits best"
+    expected, place = f"points that one camera sees, to {most:.0f} px in the mean", f"line {points.line[worst]}"
+    remedy = "correct the row, or its columns: u,v px, x,y m; y left of x"
+    reject(not fit.rms <= most, file, got, expected, remedy, place)
+    got, expected = "points that leave the focal length open", f"points that tell it to {OPEN:.0%}"
+    reject(not fit.focal_sd <= OPEN * focal, file, got, expected, "add points nearer and farther", "points")
+    below = not fit.camera.position[2] > 0
     got, expected = "points seen from below the ground", "a camera above the ground"
     reject(below, file, got, expected, "let y be left of x, as seen from above: negate all y", "points")
-    require_camera(camera, file)
-    return fit
+    require_camera(fit.camera, file)
 
 
 def _on_line(at: Array) -> bool:
@@ -125,7 +133,7 @@ def _fitted(uv: Array, xy: Array, size: Array) -> tuple[Array, Array, float]:
 
 
 def _deviations(
-    uv: Array, xy: Array, rotation: Array, shift: Array, focal: float, size: Array, residual: Array
+    xy: Array, rotation: Array, shift: Array, focal: float, residual: Array
 ) -> tuple[float, float, float]:
     """Returns the standard deviations of height, tilt and focal length; inf if the points leave them open."""
     import cv2
@@ -137,7 +145,7 @@ def _deviations(
     _, values, axes = np.linalg.svd(J * unit, full_matrices=False)
     if values[-1] <= 1e-9 * values[0]:
         return np.inf, np.inf, np.inf
-    freedom = max(2 * len(uv) - UNKNOWNS, 1)
+    freedom = max(2 * len(xy) - UNKNOWNS, 1)
     noise = max(1.0, float(np.sqrt((residual**2).sum() / freedom)))
     root = noise * axes.T / values * unit[:, None]  # S = root rootᵀ
 
