@@ -58,7 +58,7 @@ def of_scenes(source: Source, seeds: range, data: Path) -> None:
         found.append(scores(scene))
     known = np.array([error for error in errors if error is not None]).reshape(-1, 3)
     head([source, "scenes", "ground known", "tilt, °", "camera's height", "distances"])
-    middle, most = (np.quantile(np.abs(known), q, axis=0) for q in (0.5, 0.9))
+    middle, most = (np.nanquantile(np.abs(known), q, axis=0) for q in (0.5, 0.9))
     forms = (".1f", ".1%", ".1%")
     cells = [f"{a:{form}}, {b:{form}}" for a, b, form in zip(middle, most, forms, strict=True)]
     row(["median, 90 %", str(len(errors)), str(len(known)), *cells])

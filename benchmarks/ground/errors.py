@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations
 from pathlib import Path
 from typing import NamedTuple
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from benchmarks.belief.pets import CALIBRATION, known_boxes
 from benchmarks.ground.scenes import Tracked
+from sim.elementary import length
 from sim.scene.standing import standing_points
 from sim.types import Array, Camera, Tracks
 from sim.types import Sequence as Recording
@@ -38,7 +38,9 @@ def ground_error(scene: Tracked) -> GroundError | None:
     """Returns the error of the ground that the tracks of a scene show; None if they show none."""
     found = ground_below(scene.tracks, None, scene.px_per_m, scene.sequence.image_size).camera
     truth, camera = scene.sequence.truth, scene.sequence.camera
-    assert camera is not None and truth.box is not None and truth.pos is not None
+    assert camera is not None
+    assert truth.box is not None
+    assert truth.pos is not None
     if found is None:
         return None
     shown = standing_points(truth.box, found)
@@ -48,12 +50,16 @@ def ground_error(scene: Tracked) -> GroundError | None:
 
 def _error(found: Camera, camera: Camera, places: Sequence[tuple[Array, Array]]) -> GroundError:
     """places: of people in a frame, on the ground that was found, and truly, (P, 2) each."""
-    pairs = [(a[i] - a[j], b[i] - b[j]) for a, b in places for i, j in combinations(range(len(a)), 2)]
-    shown, true = (np.sqrt((np.array(d).reshape(-1, 2) ** 2).sum(axis=1)) for d in zip(*pairs, strict=True))
+    pairs = [np.triu_indices(len(true), 1) for _, true in places]
+    shown, true = (
+        np.concatenate([length(each[k][i] - each[k][j]) for each, (i, j) in zip(places, pairs, strict=True)])
+        for k in range(2)
+    )
     near = (true > NEAR[0]) & (true < NEAR[1]) & np.isfinite(shown)
     down = [np.degrees(np.arcsin(-each.rotation[2, 2])) for each in (found, camera)]
     height = float(found.position[2] / camera.position[2])
-    return GroundError(float(down[0] - down[1]), height - 1, float(np.median(shown[near] / true[near])) - 1)
+    distances = float(np.median(shown[near] / true[near])) if near.any() else float("nan")
+    return GroundError(float(down[0] - down[1]), height - 1, distances - 1)
 
 
 def scores(scene: Tracked) -> tuple[float, float, float]:

@@ -132,9 +132,7 @@ def _fitted(uv: Array, xy: Array, size: Array) -> tuple[Array, Array, float]:
     return cv2.Rodrigues(turn)[0], shift, focal
 
 
-def _deviations(
-    xy: Array, rotation: Array, shift: Array, focal: float, residual: Array
-) -> tuple[float, float, float]:
+def _deviations(xy: Array, rotation: Array, shift: Array, focal: float, residual: Array) -> tuple[float, float, float]:
     """Returns the standard deviations of height, tilt and focal length; inf if the points leave them open."""
     import cv2
 

@@ -60,9 +60,7 @@ def test_every_kind_of_source_tells_the_camera_and_takes_it(capsys, tmp_path: Pa
     for each in found.values():
         assert each["height"] == pytest.approx(found["walk"]["height"], rel=0.01)
     answer(capsys, "track", "blob", folder, "--detections", "truth", "--out", tmp_path / "run")
-    of_run = answer(
-        capsys, "calibrate", tmp_path / "run", "--out", tmp_path / "run.json", "--image-size", "640,480"
-    )
+    of_run = answer(capsys, "calibrate", tmp_path / "run", "--out", tmp_path / "run.json", "--image-size", "640,480")
     assert of_run.items() >= {"by": "tracked boxes", **WIDE}.items()
 
 
