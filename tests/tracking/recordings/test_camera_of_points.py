@@ -66,7 +66,6 @@ def test_a_first_line_may_name_the_columns_in_another_order(tmp_path: Path) -> N
     assert fit.camera.position == pytest.approx(true.position, abs=0.05)
 
 
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
@@ -75,7 +74,7 @@ def test_a_first_line_may_name_the_columns_in_another_order(tmp_path: Path) -> N
         (lambda rows: rows * [1, 1, 1, 0], "points on one line on the ground"),
         (lambda rows: rows * [1, 1, 1, -1], "negate all y"),
         (lambda rows: rows + [0, 0, 0, 5] * (np.arange(6) == 2)[:, None], "line 3: got a point"),
-        (lambda rows: rows + [500, 0, 0, 0], "expected a point in the picture of 768 × 576 px"),
+        (lambda rows: rows + np.array([500, 0, 0, 0]), "expected a point in the picture of 768 × 576 px"),
     ],
 )
 def test_points_that_determine_no_camera_are_refused(tmp_path: Path, change, words: str) -> None:

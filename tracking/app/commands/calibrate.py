@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -22,16 +21,16 @@ from tracking.app.command_options import CalibrateOptions
 from tracking.app.command_result import CommandResult
 from tracking.app.progress import ProgressMeter
 from tracking.app.sequence_workers import source_of
-from tracking.app.stored_tracks import find_tracks, holds_tracks
+from tracking.app.stored_tracks import STATED, find_tracks, holds_tracks
 from tracking.grouping.ground_of_boxes import FOCAL, LEAST, LONGEST, GroundFit, fit_ground
 from tracking.grouping.known_people import people_as_tracks
-from tracking.recordings.camera_of_points import PointFit, camera_of_points, read_points
+from tracking.recordings.camera_of_points import camera_of_points, read_points
+from tracking.recordings.options import refuse_options
 
 MOST = 3000  # boxes by which the camera is found, evenly over the recording
 DRAWS, DRAWN = 100, 1000  # draws for the interval, and boxes by which each is made, at most
 BLOCKS = 20  # of boxes without ids, drawn as wholes
 LEVEL = (5, 95)  # percentiles of the draws
-NEVER = "lens distortion (none), roll (none)"
 
 
 @dataclass(frozen=True)
@@ -58,7 +57,7 @@ def calibrate(options: CalibrateOptions) -> CommandResult:
     if options.points is None:
         camera, facts, lines = _by_boxes(options, _boxes(options, recording, tracks), image)
     else:
-        camera, facts, lines = _by_points(options, _boxes_known(recording, tracks), image)
+        camera, facts, lines = _by_points(options, _boxes_known(options, recording, tracks), image)
     write_file(out, json_document(camera_document(camera)))
     use = f"use it: --camera {out}"
     return CommandResult({"file": out, "camera": camera, **facts}, "\n".join([f"{out}: {lines[0]}", *lines[1:], use]))
@@ -67,16 +66,19 @@ def calibrate(options: CalibrateOptions) -> CommandResult:
 def _opened(options: CalibrateOptions) -> tuple[Recording, Sequence[Tracks] | None]:
     """Returns the one sequence of the source, and its tracks if the source is a run."""
     path = options.source
-    stored = holds_tracks(path) and options.boxes is None
+    stored = holds_tracks(path)
     found = find_tracks(path) if stored else source_of(options, path, images=True).open()
     got = f"{len(found)} {'runs' if stored else 'sequences'}"
     reject(len(found) != 1, path, got, "one, of one camera", "give one of them")
-    if not stored:
-        return found[0], None
-    given = options.px_per_m is not None
-    sequence = found[0].sequence(None if "fps" in found[0].info else options.fps)
-    sequence = replace(sequence, px_per_m=options.px_per_m) if given else sequence
-    return sequence, found[0].read(sequence)
+    (first,) = found
+    if isinstance(first, Recording):
+        return first, None
+    if not first.info:  # tracks of another program
+        text = first.path / "tracks.txt" if first.path.is_dir() else first.path
+        return source_of(options, text).open()[0], None
+    refuse_options(vars(options), "person_class box_scale boxes min_score", first.folder, "a run", STATED)
+    sequence = first.sequence(options.fps)
+    return sequence, first.read(sequence)
 
 
 def _picture(options: CalibrateOptions, recording: Recording) -> tuple[int, int] | None:
@@ -92,13 +94,15 @@ def _picture(options: CalibrateOptions, recording: Recording) -> tuple[int, int]
     return int(sides[0]), int(sides[1])
 
 
-def _boxes_known(recording: Recording, tracks: Sequence[Tracks] | None) -> Boxes | None:
+def _boxes_known(options: CalibrateOptions, recording: Recording, tracks: Sequence[Tracks] | None) -> Boxes | None:
     """Returns the boxes of a run or labels, else of detections; None without."""
     if tracks is not None:
         return _measured(tracks, "tracked boxes")
     if recording.load_truth is not None and "boxes" not in recording.source:
         truth = recording.truth
         if truth is not None and truth.box is not None and len(truth.box):
+            where, why = recording.source.get("path", recording.name), "labels have no scores, or give --boxes"
+            refuse_options(vars(options), "min_score", where, "labels", why)
             return _measured(people_as_tracks(truth), "labelled boxes")
     if not recording.has_detections:
         return None
@@ -115,7 +119,7 @@ def _measured(tracks: Iterable[Tracks], what: str, px_per_m: float = float("nan"
 
 
 def _boxes(options: CalibrateOptions, recording: Recording, tracks: Sequence[Tracks] | None) -> Boxes:
-    found = _boxes_known(recording, tracks)
+    found = _boxes_known(options, recording, tracks)
     if found is None and tracks is None and recording.has_images:
         found = _from_pixels(recording)
     got, expected = "no boxes of people", "labels, detections or tracks with boxes, or a video"
@@ -165,18 +169,18 @@ def _by_boxes(
         words = "its picture is taken to end with the boxes: --image-size WIDTH,HEIGHT states it"
         warnings.warn(f"{options.source}: {words}", stacklevel=2)
     height, tilt = _intervals(fit, box, person, px_per_m)
-    what = f"{len(box):,} {boxes.what}"
+    tall, focal = float(np.median(box[:, 3])) / px_per_m, fit.camera.focal_px[0]
     lines = [
         f"height {_height(fit.camera):.2f} m [{height[0]:.2f}, {height[1]:.2f}], "
         f"tilt {_tilt(fit.camera):.0f}° [{tilt[0]:.0f}, {tilt[1]:.0f}]",
-        f"from {what}: they differ by {fit.alone:.0%} in height, and by {fit.spread:.0%} on this ground",
-        f"assumed: people {float(np.median(box[:, 3])) / px_per_m:.2f} m tall; focal length {fit.camera.focal_px[0]:.0f} px, "
-        f"{FOCAL:g} of the picture's width, whose error the intervals leave out",
-        f"unknown: place (x = y = 0) and direction (along y) of the camera, {NEVER}",
+        f"from {len(box):,} {boxes.what}: they differ by {fit.alone:.0%} in height, by {fit.spread:.0%} on this ground",
+        f"assumed: people {tall:.2f} m tall; focal length {focal:.0f} px, {FOCAL:g} of the picture's width, whose "
+        "error the intervals leave out",
+        "unknown: place (x = y = 0) and direction (along y) of the camera, roll (none), lens distortion (none)",
     ]
     facts = {
         "by": boxes.what, "boxes": len(box), "height": _height(fit.camera), "height_interval": height,
-        "tilt_deg": _tilt(fit.camera), "tilt_interval": tilt, "focal_px": fit.camera.focal_px[0],
+        "tilt_deg": _tilt(fit.camera), "tilt_interval": tilt, "focal_px": focal, "person_height": tall,
         "spread": fit.spread, "spread_of_heights": fit.alone,
     }  # fmt: skip
     return fit.camera, facts, lines
@@ -209,11 +213,12 @@ def _by_points(
 ) -> tuple[Camera, dict[str, Any], list[str]]:
     """Returns the camera, its facts and lines about it."""
     assert options.points is not None
+    refuse_options(vars(options), "px_per_m", options.points, "points", "they are in metres")
     got, remedy = "no size of its pictures", "give --image-size WIDTH,HEIGHT"
     if image is None:
         raise InputError(file=options.source, got=got, expected="a recording that states it", remedy=remedy)
     table = read_points(options.points)
-    fit: PointFit = camera_of_points(table, image)
+    fit = camera_of_points(table, image)
     worst, camera = int(fit.residual.argmax()), fit.camera
     x, y, _ = camera.position
     lines = [
@@ -222,7 +227,7 @@ def _by_points(
         f"from {len(fit.residual)} points, seen {fit.rms:.2g} px off (root mean square), at most "
         f"{fit.residual[worst]:.2g} px (line {table.line[worst]}); ± is a standard deviation, for at least 1 px",
         f"it stands at x = {x:.2f} m, y = {y:.2f} m",
-        "assumed: the middle of the picture is that of the lens; lens distortion (none)",
+        "assumed: the lens is over the middle of the picture, and does not distort",
     ]
     if boxes is not None and (doubt := stature_doubt(boxes.box[np.isfinite(boxes.box).all(axis=1)], camera)):
         warnings.warn(f"{options.source}: {doubt.replace('--camera', 'this camera')}", stacklevel=2)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -126,4 +128,9 @@ def test_options_without_effect_or_sense_are_refused(capsys, tmp_path: Path) -> 
     assert "2 sequences; expected one" in refused(capsys, "calibrate", tmp_path, "--out", out)
     few = mot_folder(tmp_path / "few", gt=text(people()[:5]), ini=SIZE)
     assert "got 50 boxes; expected 100 or more" in refused(capsys, "calibrate", few, "--out", out)
+    points_given = (folder, "--points", tmp_path / "points.csv", "--out", out)
+    assert "--px-per-m; expected none for points" in refused(capsys, "calibrate", *points_given, "--px-per-m", 40)
+    both = mot_folder(tmp_path / "both", gt=text(people()), det=text(people(), ids=False), ini=SIZE)
+    line = refused(capsys, "calibrate", both, "--out", out, "--min-score", 0)
+    assert "--min-score; expected none for labels" in line
     assert not out.exists()
