@@ -74,7 +74,7 @@ def test_a_first_line_may_name_the_columns_in_another_order(tmp_path: Path) -> N
         (lambda rows: rows * [1, 1, 1, 0], "points on one line on the ground"),
         (lambda rows: rows * [1, 1, 1, -1], "negate all y"),
         (lambda rows: rows + [0, 0, 0, 5] * (np.arange(6) == 2)[:, None], "line 3: got a point"),
-        (lambda rows: rows + np.array([500, 0, 0, 0]), "expected a point in the picture of 768 × 576 px"),
+        (lambda rows: rows - np.array([100, 0, 0, 0]), "expected a point in the picture of 768 × 576 px"),
     ],
 )
 def test_points_that_determine_no_camera_are_refused(tmp_path: Path, change, words: str) -> None:
@@ -86,6 +86,22 @@ def test_points_that_determine_no_camera_are_refused(tmp_path: Path, change, wor
 def test_points_below_a_camera_that_looks_straight_down_leave_its_focal_length_open(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="focal length open"):
         fitted(tmp_path, seen(camera(90, 850, (3.0, -4.0, 6.0))))
+
+
+def test_points_of_which_most_lie_near_one_line_leave_the_focal_length_open(tmp_path: Path) -> None:
+    rows = [[399, 231, -0.476, 1.155], [193, 191, -1.663, 0.862], [467, 264, -0.057, 1.136], [651, 354, 0.977, 1.089]]
+    with pytest.raises(InputError, match="focal length open"):
+        fitted(tmp_path, np.array(rows))
+
+
+def test_a_search_from_one_focal_length_would_end_in_another_minimum(tmp_path: Path) -> None:
+    rows = [
+        [296.565, 440.112, -0.401, 0.982], [676.191, 458.189, 2.585, -0.639], [586.956, 61.462, 4.441, 3.568],
+        [375.371, 373.802, 0.502, 1.223],
+    ]  # fmt: skip
+    fit = fitted(tmp_path, np.array(rows))
+    assert fit.camera.focal_px[0] == pytest.approx(569, rel=0.02)
+    assert fit.camera.position[2] == pytest.approx(5.27, abs=0.1)
 
 
 def test_names_of_other_columns_are_refused(tmp_path: Path) -> None:
