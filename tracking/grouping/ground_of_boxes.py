@@ -101,7 +101,8 @@ def _log_ratios(foot: Array, size: Array) -> Array:
     down = foot + np.tan(TILTS)[:, None]
     stands = down > 0
     r = 1 - size / np.where(stands, down, np.nan)
-    ratio = (1 - r) / (1 - r * down * (np.sin(TILTS) * np.cos(TILTS))[:, None])
+    with np.errstate(divide="ignore"):  # a box that ends at the point right below the camera
+        ratio = (1 - r) / (1 - r * down * (np.sin(TILTS) * np.cos(TILTS))[:, None])
     return np.log(np.where(ratio > 0, ratio, np.nan))
 
 

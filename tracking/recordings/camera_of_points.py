@@ -21,7 +21,7 @@ import numpy as np
 from scenarios.errors import reject
 from scenarios.limits import COORDINATE
 from sim.scene.camera import project, require_camera
-from sim.store.numeric_text import NumericTable, is_number_text, read_rows
+from sim.store.numeric_text import CORRECT, OFFSET, NumericTable, is_number_text, read_rows
 from sim.types import Array, Camera
 
 COLUMNS = ("u", "v", "x", "y")
@@ -59,7 +59,8 @@ def read_points(path: Path) -> NumericTable:
         order = [cells.index(name) for name in COLUMNS]
     table = rows.numbers((4,), first=int(named), layout="u,v,x,y: px in the picture, m on the ground")
     table = NumericTable(path, table.values[:, order], table.line, table.layout)
-    table.reject((np.abs(table.values) > COORDINATE).any(axis=1), f"numbers within {COORDINATE:g}", "correct the row")
+    far = (np.abs(table.values) > COORDINATE).any(axis=1)
+    table.reject(far, f"numbers within {COORDINATE:g}", CORRECT, OFFSET)
     return table
 
 

@@ -25,6 +25,7 @@ from tracking.app.stored_tracks import STATED, find_tracks, holds_tracks
 from tracking.grouping.ground_of_boxes import FOCAL, LEAST, LONGEST, GroundFit, fit_ground
 from tracking.grouping.known_people import people_as_tracks
 from tracking.recordings.camera_of_points import camera_of_points, read_points
+from tracking.recordings.mot_table import size_doubt
 from tracking.recordings.options import refuse_options
 
 MOST = 3000  # boxes by which the camera is found, evenly over the recording
@@ -122,10 +123,12 @@ def _boxes(options: CalibrateOptions, recording: Recording, tracks: Sequence[Tra
     found = _boxes_known(options, recording, tracks)
     if found is None and tracks is None and recording.has_images:
         found = _from_pixels(recording)
-    got, expected = "no boxes of people", "labels, detections or tracks with boxes, or a video"
-    where = recording.source.get("path", options.source)
     if found is None:
-        raise InputError(file=where, got=got, expected=expected, remedy="give --boxes FILE, or --points FILE.csv")
+        instead = "the recording itself" if tracks is not None else "--boxes FILE"
+        raise InputError(
+            file=options.source, got="no boxes of people", remedy=f"give {instead}, or --points FILE.csv",
+            expected="labels, detections or tracks with boxes, or a video",
+        )  # fmt: skip
     return found
 
 
@@ -153,6 +156,8 @@ def _by_boxes(
     """Returns the camera, its facts and lines about it."""
     usable = np.isfinite(boxes.box).all(axis=1) & (boxes.box[:, 2:] > 0).all(axis=1)
     box, person = boxes.box[usable], boxes.person[usable]
+    doubt = "" if options.image_size is None or image is None or not len(box) else size_doubt(box, image)
+    reject(doubt, options.source, options.image_size, "pictures that hold the boxes", doubt, "--image-size")
     step = max(1, -(-len(box) // MOST))
     box, person = box[::step], person[::step]
     points = "give points of the ground: --points FILE.csv"
