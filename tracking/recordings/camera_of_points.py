@@ -124,13 +124,14 @@ def _fitted(uv: Array, xy: Array, size: Array) -> tuple[Array, Array, float]:
     found = []
     for focal in STARTS * size[0]:
         guess = np.array([[focal, 0, (size[0] - 1) / 2], [0, focal, (size[1] - 1) / 2], [0, 0, 1]])
-        rms, lens, _, turn, shift = cv2.calibrateCamera(
+        rms, lens, _, turns, shifts = cv2.calibrateCamera(
             [ground], [seen], tuple(size.astype(int).tolist()), guess, np.zeros(5), flags=fixed
         )
         if np.isfinite(rms):
-            found.append((float(rms), float(lens[0, 0]), turn[0], shift[0][:, 0]))
+            turn, shift = (np.asarray(each[0], float)[:, 0] for each in (turns, shifts))
+            found.append((float(rms), float(lens[0, 0]), turn, shift))
     _, focal, turn, shift = min(found, key=lambda each: each[:2])
-    return cv2.Rodrigues(turn)[0], shift, focal
+    return np.asarray(cv2.Rodrigues(turn)[0], float), shift, focal
 
 
 def _deviations(xy: Array, rotation: Array, shift: Array, focal: float, residual: Array) -> tuple[float, float, float]:
