@@ -39,7 +39,8 @@ class Tracked:
 
 def tracked(source: Source, seeds: range, data: Path) -> Iterator[Tracked]:
     """Yields the scene of each seed: an entry of the suites and a camera, both drawn by the seed, and for boxes a
-    detector that is fitted to a recording. Scenes that do not fit before their camera are left out."""
+    detector that is fitted to a recording. Scenes that do not fit before their
+    camera, or whose orders need more time, are left out."""
     entries = [entry for suite in SUITES for entry in resolve(suite)]
     for seed in seeds:
         r = np.random.default_rng(seed)
@@ -67,4 +68,5 @@ def _tracked(source: Source, entry: Entry, seed: int, r: np.random.Generator, da
     ready = prepare("blob", bare, detections="file" if source == "boxes" else "image")
     ready.reset(0)
     tracks = tuple(ready.step(frame) for frame in ready.frames())
+    _ = sequence.truth  # an order that was not carried out is an error here
     return Tracked(sequence, tracks, ready.px_per_m(tracks), tilt)
