@@ -50,6 +50,10 @@ SMALLER = "people of whom a smaller share is visible are ignored."
 MIN_DURATION = partial(
     option, "Leave out groups that exist for a shorter time in all, and events that concern only such groups.", "0s",
     metavar="DURATION")
+BOXES = partial(
+    option, "A detector's boxes on the pictures: MOT text, table with named columns (frames or times), COCO results.",
+    None, metavar="FILE")
+MIN_SCORE = partial(option, "Leave out boxes with a lower score, as it stands in their file.", None)
 Images = Literal["jpg", "png", "mp4"] | None
 Detections = Literal["image", "truth", "file"] | None
 DetectionsOrBoth = Literal["image", "truth", "file", "both"] | None
@@ -158,18 +162,16 @@ class TrackOptions(SceneOptions, BoxOptions, words="track"):
     """Run a tracker and store its tracks."""
 
     tracker: str = ARGUMENT("Name of a tracker, or file.py:Class, or module:Class.", metavar="TRACKER")
-    source: str = option(
-        "Sequence or dataset, as for other commands; or live: a camera's number, an address (rtsp://…, http://…), a "
-        "pipe, a growing video with --follow, or - for boxes as lines of JSON.", metavar="SOURCE", flag="")
+    source: str = ARGUMENT(
+        "Sequence or dataset; or live: a camera's number, an address (rtsp://…), a pipe, or - for boxes as JSON lines.",
+        metavar="SOURCE")
     out: Path = OUT()
     params: str | None = option(
         "The tracker's parameters: a file, or a preset such as paper.", None, metavar="FILE.toml|PRESET")
     detections: DetectionsOrBoth = option(
         "Detections that the tracker gets. Default: the first of image, file, truth that can be; with --boxes both, if "
         "tracker and source can, else file.", None)
-    boxes: Path | None = option(
-        "A detector's boxes on the pictures: MOT text, table with named columns (frames or times), COCO results.", None,
-        metavar="FILE")
+    boxes: Path | None = BOXES()
     grouping: Path | None = GROUPING()
     seed: int = option("The tracker's seed.", 0, low=0)
     camera: Path | None = CAMERA()
@@ -177,10 +179,9 @@ class TrackOptions(SceneOptions, BoxOptions, words="track"):
         "Frames a background model is trained on, or a picture of the empty place.", None,
         metavar="first:N|learn:N|spread:N|PICTURE")
     mask: str | None = option(
-        "The region of the image that counts: a picture that is not black there, or a polygon in px.", None,
-        metavar="PICTURE|X1,Y1,X2,Y2,X3,Y3,…")
+        "The region that counts: a picture, black elsewhere, or a polygon in px.", None, metavar="PICTURE|X1,Y1,X2,…")
     step_timeout: float | None = STEP_TIMEOUT()
-    min_score: float | None = option("Leave out boxes with a lower score, as it stands in their file.", None)
+    min_score: float | None = MIN_SCORE()
     follow: float | None = option(
         "Live: read a video while it grows, until it has not for X seconds.", None, low=0, metavar="X")
     stream: bool = option("Live: print each frame's people, groups, events and counts as a line of JSON.", False)
@@ -199,6 +200,20 @@ class GroupOptions(BoxOptions, words="group"):
     probabilities: bool = option("Store the probability that two people belong together.", False)
     min_duration: str = MIN_DURATION()
     camera: Path | None = CAMERA()
+
+
+class CalibrateOptions(BoxOptions, words="calibrate"):
+    """Find the camera of a recording, by points on its ground or by the boxes of its people, and write it."""
+
+    source: Path = ARGUMENT("Labelled people, detections, a video, or output of `track`.", metavar="SOURCE|TRACKS")
+    out: Path = FILE("Camera to write, for --camera.", metavar="FILE.json")
+    points: Path | None = option(
+        "Points on the ground, 4 or more: rows u,v (px in the picture), x,y (m). Default: boxes tell the camera.", None,
+        metavar="FILE.csv")
+    boxes: Path | None = BOXES()
+    min_score: float | None = MIN_SCORE()
+    image_size: str | None = option(
+        "Size of the pictures, px, if the recording does not state it.", None, metavar="WIDTH,HEIGHT")
 
 
 class ScoreOptions(BoxOptions, words="score"):

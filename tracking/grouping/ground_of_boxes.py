@@ -59,13 +59,31 @@ def ground_of_boxes(tracks: Sequence[Tracks], px_per_m: float, image_size: tuple
         measured = t.measured & (t.box[:, 3] > 0) if t.box is not None else np.zeros(0, bool)
         if t.box is not None and measured.any():
             box, last, begun = np.concatenate([box, t.box[measured]]), t.index, min(begun, t.t)
-    if len(box) < LEAST or not px_per_m > 0:
-        return Ground(None, last)
+    fit = fit_ground(box, px_per_m, image_size) if len(box) >= LEAST else None
+    return Ground(fit.camera if fit is not None and fit.agrees else None, last)
+
+
+@dataclass(frozen=True)
+class GroundFit:
+    """The camera on whose ground boxes agree best. Mean absolute deviations, bounded: `spread` of ln (H / C) from its
+    median there, `alone` of ln h."""
+
+    camera: Camera
+    spread: float
+    alone: float
+
+    @property
+    def agrees(self) -> bool:
+        """Whether boxes agree on the ground so much better than on one height in px that it is used."""
+        return self.spread < SURE * self.alone
+
+
+def fit_ground(box: Array, px_per_m: float, image_size: tuple[int, int] | None = None) -> GroundFit | None:
+    """Returns the ground of boxes (R, 4), px, of people; None if they tell none. Other arguments as above."""
     width, height = image_size or (box[:, :2] + box[:, 2:]).max(axis=0).tolist()
+    if width <= 0 or not px_per_m > 0:
+        return None
     size, focal = box[:, 3], FOCAL * width
-    differ = _spread(np.log(size / np.median(size)))
-    if width <= 0:
-        return Ground(None, last)
     log_ratio = _log_ratios((box[:, 1] + size - height / 2) / focal, size / focal)
     seen = np.isfinite(log_ratio).any(axis=1)
     middle = np.zeros(len(TILTS))
@@ -73,10 +91,9 @@ def ground_of_boxes(tracks: Sequence[Tracks], px_per_m: float, image_size: tuple
     spread = _spread(log_ratio - middle[:, None])
     best = int(spread.argmin())
     position = np.array([0.0, 0.0, np.median(size) / px_per_m / np.exp(middle[best])])
-    if spread[best] >= SURE * differ:
-        return Ground(None, last)
     picture, rotation = (int(np.ceil(width)), int(np.ceil(height))), camera_rotation(TILTS[best], 0.0)
-    return Ground(Camera("pinhole", picture, (focal, focal), (width / 2, height / 2), position, rotation), last)
+    camera = Camera("pinhole", picture, (focal, focal), (width / 2, height / 2), position, rotation)
+    return GroundFit(camera, float(spread[best]), float(_spread(np.log(size / np.median(size)))))
 
 
 def _log_ratios(foot: Array, size: Array) -> Array:
@@ -84,7 +101,8 @@ def _log_ratios(foot: Array, size: Array) -> Array:
     down = foot + np.tan(TILTS)[:, None]
     stands = down > 0
     r = 1 - size / np.where(stands, down, np.nan)
-    ratio = (1 - r) / (1 - r * down * (np.sin(TILTS) * np.cos(TILTS))[:, None])
+    with np.errstate(divide="ignore"):  # a box that ends at the point right below the camera
+        ratio = (1 - r) / (1 - r * down * (np.sin(TILTS) * np.cos(TILTS))[:, None])
     return np.log(np.where(ratio > 0, ratio, np.nan))
 
 

@@ -60,6 +60,8 @@ def made(tmp_path_factory) -> Path:
     for name, out in (("data", "tracks"), ("seen/flockscope-demo/scene-s40000", "tracks-seen")):
         assert run(["track", FAKE, str(folder / name), "--out", str(folder / out)]) == 0
     rows = [{"name": f"s{k}", "objective": k / 8} for k in range(6)]
+    points = "5,90,-2.79,3.88 120,92,2.59,3.76 64,40,0,10.51 20,30,-5.83,14.22 110,32,5.75,13.31"
+    (folder / "scene.toml.csv").write_text(points.replace(" ", "\n"))
     (folder / "scores.json").write_text(json.dumps({"sequences": rows}))
     return folder
 
@@ -111,6 +113,9 @@ COMMANDS = {
     "track": ("track " + FAKE + " {data} --out {out}", "track " + FAKE + " {out}/nothing --out {out}/x"),
     "track blob": ("track blob {one} --out {out}", "track blobb {one} --out {out}"),
     "group": ("group {data} --out {out}", "group {out}/nothing --out {out}/x"),
+    "calibrate": (
+        "calibrate {seen} --points {scene}.csv --out {out}/camera.json", "calibrate {seen} --out {out}/camera.json",
+    ),
     "score": ("score {data} {tracks}", "score {data} {out}/nothing"),
     "errors": ("errors {data} {tracks}", "errors {data} {out}/nothing"),
     "stress": (
