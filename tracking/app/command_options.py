@@ -135,8 +135,7 @@ class BoxOptions(LabelOptions):
 class DemoOptions(Options, words="demo"):
     """Generate scenes, track them, score the tracks and write a page with the results."""
 
-    quick: bool = option(
-        "A quick look: the suite quick with one seed, two trackers, and one scene with small pictures.", False)
+    quick: bool = option("A quick look: suite quick with one seed, two trackers, one scene with small pictures.", False)
     out: Path = OUT(default=Path("flockscope-demo"))
 
 
