@@ -24,7 +24,15 @@ from tracking.detect import blobs
 from tracking.detect.background import Background, fused_foreground
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.background_training import check_frame
-from tracking.detect.camera_motion import Laid, Stabiliser, boxes_after, in_picture, on_one_picture, poses_of_sample
+from tracking.detect.camera_motion import (
+    Laid,
+    Stabiliser,
+    boxes_after,
+    in_picture,
+    inverse,
+    on_one_picture,
+    poses_of_sample,
+)
 from tracking.detect.ghosts import Ghosts, uncovered_in_sample
 from tracking.detect.person_size import PersonSize
 from tracking.detect.picture_check import PictureCheck
@@ -34,6 +42,7 @@ from tracking.detect.smoothing import independent_noise, smoothed, window
 LEAST_AREA, LEAST_PIXELS = 0.0125, 12.0
 ASSUMED_HEIGHT = 18.0  # m that the image is assumed to be high while its scale is unknown.
 MOST_FOREGROUND = 0.6  # Share of the image: a frame with more foreground is not measured (ours).
+LOST_TIME = 0.5  # s for which pictures cannot be laid until the background is begun anew
 CHECK_TIME = 2.0  # s from one look at whether the camera moves to the next
 WATCH_TIME = 10.0  # s after which looks are at the model anew
 SUSPECT = 0.25  # share of foreground at which it is looked at in each picture
@@ -160,7 +169,7 @@ class Foreground:
         """Returns a picture laid on the model, which follows the camera; None if it cannot be laid."""
         laid = stabiliser.lay(image)
         if laid is None:
-            return None
+            return self._begun_anew(image, stabiliser) if stabiliser.lost >= self._fps * LOST_TIME else None
         step = stabiliser.step()
         if step is not None:
             whole = bool((step[:2, :2] == np.eye(2)).all() and (step[2] == (0, 0, 1)).all())
@@ -176,6 +185,16 @@ class Foreground:
             colour = np.moveaxis(laid.image, -1, 0).astype(np.float32) / self.model.gain[:, None, None]
             self.model.mend(fresh, colour)
         return laid
+
+    def _begun_anew(self, image: Image, lost: Stabiliser) -> Laid:
+        """Makes a picture that could not be laid for some time the background: who is in it comes out by moving."""
+        self._step = inverse(lost.pose) @ self._step
+        colour = np.moveaxis(image, -1, 0).astype(np.float32) / self.model.gain[:, None, None]
+        self.model.mend(np.ones(self.shape, bool), colour)
+        if self.ghosts is not None:
+            self.ghosts = Ghosts(self.shape, self.model.noise(), self._fps)
+        self.stabiliser = Stabiliser(self.model.picture(), self.model.valid, self._fps)
+        return Laid(image, np.ones(self.shape, bool))
 
     def take_step(self) -> Array | None:
         """Returns the homography (3, 3) by which the image of the model has moved since the last call; None if it has

@@ -160,6 +160,20 @@ def test_a_turning_camera_takes_its_background_along() -> None:
     assert total == pytest.approx(2.0 * (69 - 15), abs=3)
 
 
+def test_pictures_that_cannot_be_laid_become_the_background() -> None:
+    """Half a second after the camera looks elsewhere, all at once."""
+    scene, other = wide(), wide(1)
+    pipeline = foreground(np.stack([seen(scene, *shake(k), k) for k in range(30)]), moves=True)
+    plausible, share = [], []
+    for k in range(30, 50):
+        found = pipeline.segment(seen(other, *shake(k), k))
+        pipeline.adapt(found, np.zeros(found.mask.shape, bool))
+        plausible.append(found.plausible)
+        share.append(found.mask.mean())
+    assert plausible == [False] * 4 + [True] * 16
+    assert max(share[5:]) < 0.05
+
+
 def test_the_tracks_of_a_shaken_camera_are_in_the_picture() -> None:
     scene = wide()
     sample = np.stack([seen(scene, *shake(k), k) for k in range(30)])
