@@ -19,7 +19,7 @@ from tracking.grouping.group_events import SEARCHED
 from tracking.grouping.link_rule import CELLS, Links
 from tracking.grouping.motion_history import PeopleRows
 from tracking.grouping.pair_beliefs import BeliefHistory, PairBeliefs, StepBeliefs
-from tracking.grouping.person_motion import taken
+from tracking.grouping.person_motion import new_places, taken
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,9 +53,7 @@ class StepGrouping:
     def take_people(self, rows: Ints) -> None:
         """Renumbers the people, who keep their order: person k becomes who was person rows[k], or somebody new if
         rows[k] is -1."""
-        place = np.full(len(self.label) + 1, -1)
-        place[rows[rows >= 0]] = np.flatnonzero(rows >= 0)
-        self.label = place[taken(self.label, rows, -1)]
+        self.label = new_places(rows, len(self.label))[taken(self.label, rows, -1)]
 
     def add(self, first: int, end: int, step: Ints, a: Ints, b: Ints, values: Array) -> StepGroups:
         """Returns the groups of the steps first … end - 1, and, to begin with, of the step before. step, a, b, values
@@ -138,8 +136,7 @@ class _LinkedPairs:
 
     def take_people(self, rows: Ints) -> None:
         """Renumbers the people, as `PairHistory.take_people`."""
-        place = np.full(self.people + 1, -1)
-        place[rows[rows >= 0]] = np.flatnonzero(rows >= 0)
+        place = new_places(rows, self.people)
         self.people = len(rows)
         there = (place[self.a] >= 0) & (place[self.b] >= 0)
         self.a, self.b, self.total = place[self.a[there]], place[self.b[there]], self.total[there]

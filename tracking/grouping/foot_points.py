@@ -99,20 +99,20 @@ def places_on(ground: Ground, scene: Scene | None, tracks: Sequence[Tracks]) -> 
     """Returns the points on a known ground (R, 2), m, of all rows of tracks. Boxes that show the ground tell no place
     in the scene."""
     assert ground.camera is not None
-    boxes = [np.full((len(t.id), 4), np.nan) if t.box is None else t.box for t in tracks]
-    box = np.concatenate([np.zeros((0, 4)), *boxes])
-    return standing_points(box, ground.camera, scene if ground.source == "camera" else None)
+    return standing_points(_boxes(tracks), ground.camera, scene if ground.source == "camera" else None)
 
 
 def _boxes(tracks: Sequence[Tracks]) -> Array:
-    return np.concatenate([np.zeros((0, 4)), *(t.box for t in tracks if t.box is not None)])
+    """Returns the boxes (R, 4) of all rows, nan where a frame has none."""
+    boxes = [np.full((len(t.id), 4), np.nan) if t.box is None else t.box for t in tracks]
+    return np.concatenate([np.zeros((0, 4)), *boxes])
 
 
 def standing(tracks: Sequence[Tracks], camera: Camera, scene: Scene | None) -> list[Tracks]:
     """Returns tracks of boxes in the image as tracks on the ground, at the points where the boxes stand. Velocities
     become nan. Groups that the tracker named are kept, with new shapes; other `groups` become None."""
     ground = standing_points(_boxes(tracks), camera, scene)
-    cuts = np.cumsum([0, *(0 if t.box is None else len(t.box) for t in tracks)]).tolist()
+    cuts = np.cumsum([0, *(len(t.id) for t in tracks)]).tolist()
     moved = [
         t.replace(
             plane="ground", pos=ground[a:b], vel=np.full((b - a, 2), np.nan),

@@ -205,7 +205,7 @@ class GroupsSoFar:
 
     def _block(self, tracks: Sequence[Tracks]) -> list[Tracks]:
         tracks = self.velocities.add([self._as_named(t) for t in tracks])
-        first, self.end = self.end, tracks[-1].index
+        self.end = tracks[-1].index
         self.scale = self.px_per_m if tracks[0].plane == "image" and self.places is None else 1.0
         rows = people_rows(tracks, self.scale, None if self.places is None else self.places(tracks))
         if self.places is not None:
@@ -219,7 +219,7 @@ class GroupsSoFar:
             group = rows.group
             if changes:
                 group, events = self._labelled(rows, steady, column, found)
-            self.history.label(group, first)
+            self.history.label(group)
             rows, steady = replace(rows, group=group), replace(steady, group=group)
             events += [] if self.objective else self._crossings_and_queues(steady)
         events = [e for e in events if (e.emitted or e.start) < self.own.get(e.kind, math.inf)]

@@ -25,6 +25,7 @@ from sim.truth.merge_split_rules import (
 )
 from sim.types import Array, Bools, Ints
 from tracking.config import Config, param
+from tracking.grouping.person_motion import new_places
 
 CELLS = 1_000_000  # Numbers worked on together: bounds memory.
 
@@ -90,8 +91,7 @@ class RuleLinks:
     def take_people(self, rows: Ints) -> None:
         """Renumbers the people, who keep their order: person k becomes who was person rows[k], or somebody new if
         rows[k] is -1."""
-        place = np.full(self.people + 1, -1)
-        place[rows[rows >= 0]] = np.flatnonzero(rows >= 0)
+        place = new_places(rows, self.people)
         self.people, self.column = len(rows), place[self.column]
         there = (place[self.a] >= 0) & (place[self.b] >= 0)
         self.a, self.b = place[self.a[there]], place[self.b[there]]

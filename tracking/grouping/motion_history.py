@@ -47,7 +47,12 @@ class _Part:
     first: int  # its frames: from `first` to before `end`
     end: int
     motion: MotionRows  # columns: rows of `ids`; frames as in `rows`
-    seen: Bools  # (R,): of the rows of `motion`
+    order: Ints  # (R,): the row of `rows` of each row of `motion`
+
+    @property
+    def seen(self) -> Bools:
+        """Flags (R,) of the rows of `motion`."""
+        return self.rows.seen[self.order]
 
     @classmethod
     def of(cls, rows: PeopleRows, first: int, end: int) -> _Part:
@@ -56,7 +61,13 @@ class _Part:
         order = order[np.isfinite(rows.pos[order]).all(axis=1)]
         some = rows.take(order)
         motion = MotionRows(some.frame, column[order], some.pos, some.vel, some.group, end)
-        return cls(rows, ids, first, end, motion, some.seen)
+        return cls(rows, ids, first, end, motion, order)
+
+    def labelled(self, group: Ints) -> _Part:
+        """Returns the part with other group ids (R,) of its last rows."""
+        group = np.append(self.rows.group[: len(self.rows.group) - len(group)], group)
+        motion = replace(self.motion, group=group[self.order])
+        return replace(self, rows=replace(self.rows, group=group), motion=motion)
 
     def columns(self, people: Sequence[int]) -> list[int]:
         """Returns the columns of people by id, -1 for whoever is not there."""
@@ -98,17 +109,9 @@ class MotionHistory:
         self.parts.append(part)
         self.end = end
 
-    def label(self, group: Ints, first: int) -> None:
-        """Sets the group ids (R,) of all rows from frame `first` on."""
-        kept, some = [p for p in self.parts if p.end <= first], [p for p in self.parts if p.end > first]
-        low = 0
-        for part in some:
-            old = part.rows.group[: int(np.searchsorted(part.rows.frame, first))]
-            high = low + len(part.rows.group) - len(old)
-            rows = replace(part.rows, group=np.concatenate([old, group[low:high]]))
-            kept.append(_Part.of(rows, part.first, part.end))
-            low = high
-        self.parts = kept
+    def label(self, group: Ints) -> None:
+        """Sets the group ids (R,) of the rows that were added last."""
+        self.parts[-1] = self.parts[-1].labelled(group)
 
     def forget(self, before: int, people: Set[int]) -> None:
         """Forgets the frames before `before`, and that anybody but `people`, ids, has been measured."""

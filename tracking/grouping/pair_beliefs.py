@@ -16,7 +16,7 @@ from sim.types import Array, Bools, Ints
 from tracking.grouping.belief import Belief
 from tracking.grouping.mate_share import MateShare
 from tracking.grouping.pair_evidence import PairHistory, PairRows
-from tracking.grouping.person_motion import TIMES, Motion, StepRows, frames_per_step, step_rows, taken
+from tracking.grouping.person_motion import TIMES, Motion, StepRows, frames_per_step, new_places, step_rows, taken
 from tracking.grouping.tracks_table import TracksTable
 
 
@@ -69,8 +69,7 @@ class BeliefHistory:
 
     def take_people(self, rows: Ints) -> None:
         """Renumbers the people, as `PairHistory.take_people`."""
-        place = np.full(self.pairs.people + 1, -1)
-        place[rows[rows >= 0]] = np.flatnonzero(rows >= 0)
+        place = new_places(rows, self.pairs.people)
         self.column = place[self.column]
         self.pairs.take_people(rows)
 

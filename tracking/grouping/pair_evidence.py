@@ -24,7 +24,7 @@ import numpy as np
 from sim.truth.merge_split_rules import MERGE_DISTANCE, SPLIT_VELOCITY, close_pairs
 from sim.types import Array, Bools, Ints
 from tracking.grouping import person_motion
-from tracking.grouping.person_motion import CORRELATION, Motion, PersonMotion, StepRows, taken
+from tracking.grouping.person_motion import CORRELATION, Motion, PersonMotion, StepRows, new_places, taken
 
 REACH = 4.0  # m: pairs farther apart have no evidence.
 STANDING = 0.3  # m/s.
@@ -106,8 +106,7 @@ class PairHistory:
     def take_people(self, rows: Ints) -> None:
         """Renumbers the people: person k becomes who was person rows[k], or somebody new if rows[k] is -1. Those who
         stay keep their order."""
-        place = np.full(self.people + 1, -1)
-        place[rows[rows >= 0]] = np.flatnonzero(rows >= 0)
+        place = new_places(rows, self.people)
         self.motion.take(rows)
         self.people = len(rows)
         a, b = place[self.a], place[self.b]

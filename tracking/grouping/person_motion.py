@@ -140,6 +140,14 @@ class SteadyPlaces:
             setattr(self, name, taken(getattr(self, name), rows, empty))
 
 
+def new_places(rows: Ints, count: int) -> Ints:
+    """Returns the new number of each of `count` people, and -1 at the end, if person k becomes who was person rows[k];
+    -1 for those who are gone."""
+    place = np.full(count + 1, -1)
+    place[rows[rows >= 0]] = np.flatnonzero(rows >= 0)
+    return place
+
+
 def taken(table: Any, rows: Ints, empty: float) -> Any:
     """Returns the rows (R,) of a table (K, ...); `empty` where a row is -1."""
     found = np.full((len(rows), *table.shape[1:]), empty, table.dtype)

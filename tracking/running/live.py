@@ -280,6 +280,8 @@ class Live:
         if self.mode == "file" and image is not None and not self.sequence.has_images:
             remedy = "give pictures from the first frame on, or never"
             raise InputError(place=f"frame {index}", got="a picture", expected="boxes or points", remedy=remedy)
+        if self.mode == "file":
+            image = right = None  # as of a recording: the tracker does not look at them
         if self.mask is None:
             return Frame(index, t, image, right, found)
         if self.region is None:
