@@ -6,8 +6,8 @@ moved: a street for SECONDS, seen at SIZE by a camera that stands still, and by 
 px in one frame of twelve), turns by 3 px a frame, and drifts by 0.5 px a frame. HOTA and MOTA of `blob` from pixels by
 IoU of boxes, without and with `tracking.detect.camera_motion`; the difference of HOTA from the still camera, paired by
 seeds, and its share. Pictures are turned from wider ones of the still camera, with their noise added afterwards, which
-is some twenty times quicker than to draw each anew and differs by the interpolation only. robot: the entry `robot` of
-the suite `camera-motion`, from the sensor's boxes, where nothing is compensated.
+is much quicker than to draw each anew and differs by the interpolation only. robot: the entry `robot` of the suite
+`camera-motion`, from the sensor's boxes, where nothing is compensated.
 
 still: of so many sequences of the suite `looks`, each of other ground, light, weather and lens, in how many the camera
 was found to move.

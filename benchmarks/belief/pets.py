@@ -3,8 +3,7 @@
 Two couples were found by eye in the pictures and in the labelled places (`COUPLES`); the other labelled people walk
 alone. Precision and recall of pairs of one frame, people compared by the overlap of boxes. gt: labelled boxes with
 their ids; det: the detector's boxes, tracked by `blob`; pixels: tracked by `blob`. Camera: known (the calibration of
-the recording), learned (from the boxes), or none (one scale for near and far). Pixels are never moved to the ground
-without a camera.
+the recording), learned (from the boxes), or none (one scale for near and far).
 """
 
 from __future__ import annotations
@@ -74,8 +73,7 @@ def runs(folder: Path) -> Iterator[tuple[str, str, Recording, Sequence[Tracks]]]
         recording = open_source(folder, camera=calibration, background="spread:50")[0]
         yield "gt", camera, recording, known_boxes(recording)
         yield "det", camera, recording, tracked(recording, "det")
-        if camera != "learned":
-            yield "pixels", camera, recording, tracked(recording, "pixels")
+        yield "pixels", camera, recording, tracked(recording, "pixels")
 
 
 def pets(data: Path, belief: Belief, before: Belief | None) -> None:
@@ -86,18 +84,16 @@ def pets(data: Path, belief: Belief, before: Belief | None) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)
         for source, camera, recording, people in runs(data / PETS):
-            cells = [number(x) for b in beliefs.values() for x in pair_scores(source, camera, recording, people, b)]
+            cells = [number(x) for b in beliefs.values() for x in pair_scores(camera, recording, people, b)]
             row([source, camera, *cells])
 
 
-def pair_scores(
-    source: str, camera: str, recording: Recording, people: Sequence[Tracks], belief: Belief
-) -> tuple[float, float]:
+def pair_scores(camera: str, recording: Recording, people: Sequence[Tracks], belief: Belief) -> tuple[float, float]:
     """Returns precision and recall of the pairs that a belief finds among tracked people."""
     truth = recording.truth
     assert truth is not None
     truth = with_couples(truth)
-    if camera == "none" and source != "pixels":
+    if camera == "none":
         tracks = with_groups(people, recording.fps, truth.px_per_m, belief)
     else:
         tracks, _ = completed(
