@@ -40,6 +40,7 @@ from tracking.detect.background_kernels import Floats
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.background_training import check_frame, thresholds, train
 from tracking.detect.background_training_kernels import FLOOR
+from tracking.detect.mosaic import Mosaic
 from tracking.detect.shadow_depth import BINS, SAMPLED, darkest_shadow
 from tracking.detect.shadow_depth_kernels import count_even
 
@@ -89,6 +90,7 @@ class Background:
         self._grid = brightness_gain.grid(*self.valid.shape)
         self._grid_background = self.valid[self._grid]
         self._first_row = 0
+        self._whole: Mosaic | None = None
         self._grey = bool((sample[..., :1] == sample).all())
         self._darkened = np.zeros(BINS, np.int64)
         self.follow(self.settings)
@@ -174,21 +176,48 @@ class Background:
         self.gain, self._grid_background = np.ones(3, np.float32), self.valid[self._grid]
         self.follow(self.settings)
 
+    def look_at(self, at: tuple[int, int], size: tuple[int, int]) -> None:
+        """Makes a window of the model, of `size` (width, height) px, its image; the rest waits for `carry`.
+
+        at: left and top of the window, px."""
+        self._whole = Mosaic(*self._planes(), at, size)
+        self._take_window()
+
+    def begin_anew(self, colour: Floats) -> None:
+        """Takes `colour` (3, H, W), at gain 1, as the background, and forgets what lies beside the image."""
+        self.mend(np.ones(self.valid.shape, bool), colour)
+        self._whole = None
+
     def carry(self, step: Array, whole: bool) -> None:
-        """Moves the model in its image by a homography `step` (3, 3), px; what comes into view becomes not `valid`.
+        """Moves the model in its image by a homography `step` (3, 3), px; what comes into view for the first time
+        becomes not `valid`.
 
         whole: the step is a shift by whole px, so that no colour is interpolated.
         """
-        size, flags = self.valid.shape[::-1], cv2.INTER_NEAREST if whole else cv2.INTER_LINEAR
+        planes, known = self._planes()
+        if self._whole is None:
+            self._whole = Mosaic(planes, known, (0, 0), self.valid.shape[::-1])
+        else:
+            self._whole.store(planes, known)
+        if whole:
+            right, down = np.rint(step[:2, 2]).astype(int).tolist()
+            self._whole.move(-right, -down)
+        else:
+            self._whole.bend(step)
+        self._take_window()
+
+    def _planes(self) -> tuple[Floats, Bools]:
         middle = np.median(self.s[self.valid]), np.median(self.b[self.valid])
         s, b = (np.where(self.valid, n, m) for n, m in zip((self.s, self.b), middle, strict=True))
-        for planes in (self.mean, self.var):
-            for plane in planes:
-                plane[:] = cv2.warpPerspective(plane, step, size, flags=flags, borderValue=1.0)
-        self.valid = cv2.warpPerspective(self.valid.astype(np.uint8) * 255, step, size, flags=flags) == 255
-        moved = (cv2.warpPerspective(n.astype(np.float32), step, size, flags=flags) for n in (s, b))
-        self.s, self.b = (np.where(self.valid, n, np.float32(np.inf)) for n in moved)
-        self._grid_background &= self.valid[self._grid]
+        return np.concatenate([self.mean, self.var, s[None], b[None]]).astype(np.float32), self.valid
+
+    def _take_window(self) -> None:
+        assert self._whole is not None
+        planes, self.valid = self._whole.window()
+        self.mean, self.var = (np.ascontiguousarray(planes[k : k + 3]) for k in (0, 3))
+        self.s, self.b = (np.where(self.valid, n, np.float32(np.inf)) for n in planes[6:])
+        self._grid = brightness_gain.grid(*self.valid.shape)
+        self._grid_background = self.valid[self._grid]
 
     def picture(self) -> Image:
         """Returns the empty scene (H, W, 3) BGR uint8 in the brightness of the last frame."""

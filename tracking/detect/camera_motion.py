@@ -109,23 +109,27 @@ def laid_on(corners: Corners, picture: Image, guess: Array) -> Array | None:
 
     guess (3, 3): one that is near.
     """
-    if len(corners.at) < LEAST_INLIERS:
+    # Laid by the guess first: windows of the flow only shift, and a turned picture is stretched.
+    near = cv2.warpPerspective(picture, guess, corners.size, flags=cv2.INTER_LINEAR)
+    origin = mapped(inverse(guess), corners.at.astype(np.float64))
+    begun = ((origin >= 0) & (origin < picture.shape[::-1])).all(axis=1)
+    if np.count_nonzero(begun) < LEAST_INLIERS:
         return None
-    start = mapped(inverse(guess), corners.at.astype(np.float64)).astype(np.float32)
-    seen, status, _ = cv2.calcOpticalFlowPyrLK(
-        corners.grey, picture, corners.at[:, None], start[:, None].copy(), winSize=WINDOW, maxLevel=LEVELS,
-        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
-    )  # fmt: skip
-    inside = (seen[:, 0] >= 0).all(axis=1) & (seen[:, 0] < corners.size).all(axis=1)
-    kept = (status[:, 0] == 1) & inside & np.isfinite(seen[:, 0]).all(axis=1)
+    at, cell = corners.at[begun], corners.cell[begun]
+    found, status, _ = cv2.calcOpticalFlowPyrLK(corners.grey, near, at[:, None], None, winSize=WINDOW, maxLevel=LEVELS)
+    seen_at = mapped(inverse(guess), found[:, 0].astype(np.float64))
+    inside = ((seen_at >= 0) & (seen_at < picture.shape[::-1])).all(axis=1)
+    kept = (status[:, 0] == 1) & inside & np.isfinite(found[:, 0]).all(axis=1)
     if np.count_nonzero(kept) < LEAST_INLIERS:
         return None
     cv2.setRNGSeed(0)
-    found, agree = cv2.findHomography(seen[kept, 0], corners.at[kept], cv2.RANSAC, RANSAC_PX)
-    if found is None:
+    step, agree = cv2.findHomography(found[kept, 0], at[kept], cv2.RANSAC, RANSAC_PX)
+    if step is None:
         return None
+    found = step @ guess
+    found /= found[2, 2]
     agree = agree[:, 0].astype(bool)
-    cells = len(np.unique(corners.cell[kept][agree])) >= LEAST_CELLS * len(np.unique(corners.cell))
+    cells = len(np.unique(cell[kept][agree])) >= LEAST_CELLS * len(np.unique(cell))
     enough = agree.sum() >= max(LEAST_INLIERS, LEAST_SHARE * np.count_nonzero(kept))
     stretch = np.sqrt(abs(np.linalg.det(found[:2, :2])))
     whole = STRETCH[0] < stretch < STRETCH[1] and np.abs(found[2, :2]).max() * max(corners.size) < 0.5
@@ -177,28 +181,6 @@ def poses_of_sample(sample: Image) -> list[Array | None] | None:
             if away >= KEY:
                 key, base, last = corners_of(picture), base @ step, np.eye(3)
     return poses if moved >= max(LEAST_MOVED, len(sample) // 10) else None
-
-
-def on_one_picture(sample: Image, poses: list[Array | None]) -> tuple[Image, Bools]:
-    """Returns the pictures of a sample (K, H, W, 3) in the place of the one whose pose is the identity, and the pixels
-    (H, W) that at least one of them shows. Pictures without a pose are left out.
-
-    What a picture does not show is taken from the picture before it that does, else from the next one.
-    """
-    height, width = sample.shape[1:3]
-    laid = [
-        (cv2.warpPerspective(p, h, (width, height)), seen(h, (width, height)))
-        for p, h in zip(sample, poses, strict=True)
-        if h is not None
-    ]
-    pictures, shown = np.stack([p for p, _ in laid]).astype(np.uint8), np.stack([s for _, s in laid])
-    for order in (range(1, len(laid)), range(len(laid) - 2, -1, -1)):
-        for k in order:
-            other = k - 1 if order.step > 0 else k + 1
-            lacks = ~shown[k] & shown[other]
-            pictures[k][lacks] = pictures[other][lacks]
-            shown[k] |= lacks
-    return pictures, np.asarray(shown.any(axis=0))
 
 
 def seen(transform: Array, size: tuple[int, int]) -> Bools:

@@ -30,10 +30,10 @@ from tracking.detect.camera_motion import (
     boxes_after,
     in_picture,
     inverse,
-    on_one_picture,
     poses_of_sample,
 )
 from tracking.detect.ghosts import Ghosts, uncovered_in_sample
+from tracking.detect.mosaic import on_one_picture
 from tracking.detect.person_size import PersonSize
 from tracking.detect.picture_check import PictureCheck
 from tracking.detect.smoothing import independent_noise, smoothed, window
@@ -98,17 +98,20 @@ class Foreground:
         self._unchecked = self._signs = self._watched = 0
         self._step = np.eye(3)
         poses = poses_of_sample(sample) if np.ndim(sample) == 4 and len(sample) > 2 else None
+        size, at = (sample.shape[2], sample.shape[1]), (0, 0)
         if poses is not None:
-            sample, known = on_one_picture(sample, poses)
-            self.stabiliser = Stabiliser(sample[len(sample) // 2], known, self._fps, poses)
+            first = sample[len(sample) // 2]
+            sample, known, at = on_one_picture(sample, poses)
             warnings.warn(MOVES, stacklevel=2)
         self.model = Background(sample, context.fps, settings)
-        if self.stabiliser is not None:
-            self.model.valid &= known
-            self.stabiliser.look_at(self.model.picture(), self.model.valid)
-        self.ghosts = Ghosts(self.shape, self.model.noise(), context.fps) if settings.adaptive else None
         if settings.adaptive:
             self.model.mend(uncovered_in_sample(self.model.mean, self.model.second, self.scale), self.model.second)
+        if poses is not None:
+            self.model.valid &= known
+            self.model.look_at(at, size)
+            self.stabiliser = Stabiliser(first, None, self._fps, poses)
+            self.stabiliser.look_at(self.model.picture(), self.model.valid)
+        self.ghosts = Ghosts(self.shape, self.model.noise(), context.fps) if settings.adaptive else None
 
     def follow(self, settings: BackgroundSettings) -> None:
         """Replaces the settings of the background model; what the model learned stays."""
@@ -190,7 +193,7 @@ class Foreground:
         """Makes a picture that could not be laid for some time the background: who is in it comes out by moving."""
         self._step = inverse(lost.pose) @ self._step
         colour = np.moveaxis(image, -1, 0).astype(np.float32) / self.model.gain[:, None, None]
-        self.model.mend(np.ones(self.shape, bool), colour)
+        self.model.begin_anew(colour)
         if self.ghosts is not None:
             self.ghosts = Ghosts(self.shape, self.model.noise(), self._fps)
         self.stabiliser = Stabiliser(self.model.picture(), self.model.valid, self._fps)
