@@ -26,7 +26,7 @@ from sim.types import Camera, Scene, Tracks
 
 PARTS = "parts"
 OURS = re.compile(r"\d{7,}(-joined)?|\.partial-.*")  # names in that folder
-EVERY = 0.5  # s between two parts
+EVERY = 0.25  # s between two parts
 JOINED = 60  # parts that are made one, so that there are few of them
 
 
@@ -54,7 +54,7 @@ class TrackParts:
         (folder / RUN).unlink(missing_ok=True)
 
     def add(self, tracks: Sequence[Tracks], info: dict[str, Any], *, now: bool = False) -> None:
-        """Adds the tracks of the next frames. They are written if half a second has passed since others were, or `now`.
+        """Adds the tracks of the next frames. They are written if EVERY s have passed since others were, or `now`.
         info: what run.json says so far."""
         self.waiting += tracks
         if not self.waiting or not (now or time.monotonic() - self.written >= EVERY):

@@ -116,7 +116,9 @@ def laid_on(corners: Corners, picture: Image, guess: Array) -> Array | None:
     if np.count_nonzero(begun) < LEAST_INLIERS:
         return None
     at, cell = corners.at[begun], corners.cell[begun]
-    found, status, _ = cv2.calcOpticalFlowPyrLK(corners.grey, near, at[:, None], None, winSize=WINDOW, maxLevel=LEVELS)
+    found, status, _ = cv2.calcOpticalFlowPyrLK(
+        corners.grey, near, at[:, None], at[:, None].copy(), winSize=WINDOW, maxLevel=LEVELS
+    )
     seen_at = mapped(inverse(guess), found[:, 0].astype(np.float64))
     inside = ((seen_at >= 0) & (seen_at < picture.shape[::-1])).all(axis=1)
     kept = (status[:, 0] == 1) & inside & np.isfinite(found[:, 0]).all(axis=1)
