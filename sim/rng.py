@@ -82,6 +82,15 @@ def poisson_quantiles(mean: float, u: Array) -> Ints:
     return np.searchsorted(share / share[-1], u).astype(np.int64)
 
 
+def poisson_counts(mean: Array, u: Array) -> Ints:
+    """Returns the quantiles (N,) of Poisson distributions with means (N,) at u (N,), 0 < u <= 1."""
+    found = np.zeros(len(u), np.int64)
+    for one in np.unique(mean).tolist():
+        here = mean == one
+        found[here] = poisson_quantiles(one, u[here])
+    return found
+
+
 def draw(value: Value, r: np.random.Generator) -> float:
     """Returns `value` as a float if it is a number, else one random draw of the distribution.
 

@@ -45,6 +45,13 @@ def encode(space: Space, config: Config) -> Array:
     return np.array([_to_unit(p, getattr(config, p.name)) for p in space])
 
 
+def moved(space: Space, residual: ArrayLike, base: Config) -> Array:
+    """Returns the vector (P,) at `residual` (P,), clipped to [-1, 1]: 0 is the config `base`, -1 and 1 are the ends of
+    the ranges, and between them each number is linear."""
+    point, origin = _point(residual, len(space)), np.clip(encode(space, base), -1.0, 1.0)
+    return np.asarray(np.where(point < 0, origin + point * (1.0 + origin), origin + point * (1.0 - origin)))
+
+
 def decode(space: Space, action: ArrayLike, base: Config) -> Config:
     """Returns the config at the vector `action` (P,), clipped to [-1, 1]; parameters not in `space` are as in `base`.
     If its values contradict each other, an allowed config between it and `base` is returned."""
@@ -57,10 +64,12 @@ def decode_and_build(space: Space, action: ArrayLike, base: Config, build: Calla
     If that config's values contradict each other, or `build` raises InputError, the config is moved towards `base` as
     far as needed (found by 6 bisections).
     """
-    point = _point(action, len(space))
+    point, origin = _point(action, len(space)), encode(space, base)
 
     def attempt(point: Array) -> T | None:
-        values = {p.name: _from_unit(p, float(a)) for p, a in zip(space, point, strict=True)}
+        # a place that is that of `base` stands for its very value, not for one that differs in the last bit
+        triples = zip(space, point.tolist(), origin.tolist(), strict=True)
+        values = {p.name: _from_unit(p, a) for p, a, b in triples if a != b}
         try:
             return build(dataclasses.replace(base, **values))
         except InputError:
@@ -69,7 +78,7 @@ def decode_and_build(space: Space, action: ArrayLike, base: Config, build: Calla
     best = attempt(point)
     if best is not None:
         return best
-    origin, near, far = encode(space, base), 0.0, 1.0
+    near, far = 0.0, 1.0
     for _ in range(HALVINGS):
         share = (near + far) / 2
         found = attempt(origin + share * (point - origin))

@@ -150,7 +150,7 @@ def observations() -> str:
     """Returns the table of the statistics that the environment observes."""
     rows = [
         row(str(k), f"`{s.name}`", "share" if s.half is None else f"{s.half:g} {s.unit}".strip(), s.meaning)
-        for k, s in enumerate(import_module("tracking.environment.observation").STATISTICS)
+        for k, s in enumerate(import_module("tracking.running.signals").STATISTICS)
     ]
     return table("", "statistic", "0.5 stands for", "meaning", rows=rows)
 

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
+from scenarios.schema.schedule import Movements
 from scenarios.schema.values import FixedPoint, Model, Positive, problem, within
 
 Degrees = Annotated[float, within(0.0, 90.0, " degrees")]
@@ -19,12 +20,12 @@ class ShakeSpec(Model):
     Attributes:
         kind: the camera trembles
         px: standard deviation of the movement of the picture's middle along each axis, px
-        roll_deg: standard deviation of the turn about the optical axis, degrees
+        roll_deg: standard deviation of the turn about the optical axis, degrees; if px changes, where it is largest
         band: lowest and highest frequency of the movement, Hz
     """
 
     kind: Literal["shake"]
-    px: Annotated[float, within(0.0, 500.0, " px")] = 8.0
+    px: Movements = 8.0
     roll_deg: Degrees = 0.2
     band: tuple[Hertz, Hertz] = (0.5, 5.0)
 

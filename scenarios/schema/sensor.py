@@ -12,7 +12,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from scenarios.limits import DETECTIONS
+from scenarios.schema.schedule import Alarms, Distances, Factors, FrameSteps, Shares
 from scenarios.schema.values import Model, Name, NonNegative, Positive, Share, within
 
 Curve = Annotated[tuple[Share, ...], Field(min_length=2)]
@@ -76,7 +76,7 @@ class BoxNoise(Model):
     top: MeanAndSd = (0.0, 0.06)
     width: MeanAndSd = (0.0, 0.18)
     floor_px: Annotated[float, within(0.0, 1000.0, " px")] = 0.3
-    scale: Annotated[float, within(0.0, 20.0)] = 1.0
+    scale: Factors = 1.0
     occluded: NonNegative = 0.0
     tails: Annotated[float, Field(ge=0, le=30)] = 0.0
     memory: Memories | None = None
@@ -129,6 +129,7 @@ class Sensor(Model):
     Attributes:
         detect_prob: probability that a fully visible person of usual size is detected
         clutter_rate: mean number of false alarms per frame (Poisson)
+        every: frames from one look of the detector to the next; there are no detections in between
         box_noise: errors of boxes, in box heights
         noise_m: standard deviation of points on the ground along each axis, m
         box: visible: boxes of the visible parts, so that occlusion moves foot points; amodal: boxes of whole people
@@ -147,10 +148,11 @@ class Sensor(Model):
         false_scores: evenly spaced quantiles of the scores of false alarms, 0 to 1
     """
 
-    detect_prob: Share = 0.95
-    clutter_rate: Annotated[float, within(0.0, DETECTIONS / 5, " false alarms per frame")] = 0.3
+    detect_prob: Shares = 0.95
+    clutter_rate: Alarms = 0.3
+    every: FrameSteps = 1.0
     box_noise: BoxNoise = BoxNoise()
-    noise_m: Annotated[float, within(0.0, 1000.0, " m")] = 0.05
+    noise_m: Distances = 0.05
     box: Literal["visible", "amodal"] = "visible"
     points: Literal["own", "seen", "foot"] = "seen"
     occlusion_power: NonNegative = 1.0

@@ -16,6 +16,7 @@ import numpy as np
 from sim.detector.visible_ground import furthest_row
 from sim.elementary import cos, exp, log, power
 from sim.scene.camera import foot_points
+from sim.schedules import values_at
 from sim.types import Array, Camera
 
 if TYPE_CHECKING:
@@ -24,14 +25,15 @@ if TYPE_CHECKING:
 GRID, FURTHEST = 1 / 64, 8.3125  # of the table of `heavy_tailed`
 
 
-def perturb_boxes(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> Array:
+def perturb_boxes(box: Array, visibility: Array, noise: BoxNoise, n: Array, t: Array | None = None) -> Array:
     """Returns boxes (R, 4), left, top, width, height in px, moved by random errors; the boxes given are not changed.
 
     n (R, 4): standard normals for the errors of the middle (to the right), the foot (downwards), the top (downwards),
     all in box heights, and of the logarithm of the width. An error is mean + standard deviation × n; `noise` holds this
     pair as across, foot, top and width. The standard deviation is multiplied by 1 + `noise.occluded` × hidden share; of
     middle, foot and top it is at least `noise.floor_px`. All errors are multiplied by `noise.scale`. `noise.tails`, an
-    excess kurtosis, gives n heavier tails. visibility (R,): visible share of each person, 0 to 1.
+    excess kurtosis, gives n heavier tails. visibility (R,): visible share of each person, 0 to 1. t (R,): times, s, for
+    a `scale` that changes; None: all 0.
 
     Width and height keep at least 1 px, or their former value if that was less; the middle and the foot stay where the
     errors put them. A nan box stays nan. If `noise.scale` is 0, `box` itself is returned.
@@ -43,8 +45,9 @@ def perturb_boxes(box: Array, visibility: Array, noise: BoxNoise, n: Array) -> A
     sd = sds * (1.0 + noise.occluded * (1.0 - visibility))[:, None]
     left, top, w, h = box.T
     px = means[:3] * h[:, None] + np.maximum(sd[:, :3] * h[:, None], noise.floor_px) * n[:, :3]
-    across, down, top_down = noise.scale * px.T
-    wider = noise.scale * (means[3] + sd[:, 3] * n[:, 3])
+    scale = values_at(noise.scale, np.zeros(len(box)) if t is None else t)
+    across, down, top_down = scale * px.T
+    wider = scale * (means[3] + sd[:, 3] * n[:, 3])
     middle, foot, top = left + w / 2 + across, top + h + down, top + top_down
     width, height = w * exp(wider), foot - top
     width, height = np.maximum(width, np.minimum(w, 1.0)), np.maximum(height, np.minimum(h, 1.0))

@@ -25,13 +25,15 @@ from sim.detector.box_noise import move_edges
 from sim.detector.draws import CLOCK, Readings, false_scores, ticks
 from sim.detector.visible_ground import GroundInView, VisibleGround, clip_boxes, furthest_row, labelled_points
 from sim.elementary import exp, log
-from sim.rng import normals, poisson_quantiles, rng, uniforms
+from sim.rng import normals, poisson_counts, rng, uniforms
 from sim.scene.body import PERSON_HEIGHT, SHOULDER_SHARE, person_boxes
 from sim.scene.camera import standing_share, to_ground
 from sim.scene.camera_motion import MovingCamera, View, by_frame, camera_at
+from sim.schedules import values_at
 from sim.types import Array, Bools, Camera, Ints, Truth
 
 if TYPE_CHECKING:
+    from scenarios.schema.schedule import Schedule
     from scenarios.schema.sensor import FalseAlarms, Sensor
 
 
@@ -73,24 +75,24 @@ def persistent_false_alarms(
 
 
 def _draw_births(
-    model: FalseAlarms, rate: float, truth: Truth, seed: int, repeat: int
+    model: FalseAlarms, rate: float | Schedule[float], truth: Truth, seed: int, repeat: int
 ) -> Iterator[tuple[int, float, tuple[int, int], Array, Array]]:
     """Yields each alarm of a sequence that lives in a frame, in order of birth: first frame (from 1), age there, s, its
     name (tick of birth, and number among those born then), which names its random streams, and its uniforms.
 
     The uniforms are (9,) at birth, columns LIFE …, and (L, 7) in the L frames that it lives, columns SHOWN …. The first
     tick starts with the stationary number of living alarms, as if some had begun earlier. rate: mean number of alarms
-    reported per frame.
+    reported per frame; if it changes, the number follows as old alarms end.
     """
     frames = np.arange(1, truth.length + 1)
     # the steps at which alarms may be born, and the step of each frame; without a life every frame is a step
     step, per_s, q = frames - 1, truth.fps, 0.0
     if model.life:
         step, per_s, q = ticks(frames, truth.fps), CLOCK, float(exp(-1.0 / (CLOCK * model.life)))
-    alive = rate / model.seen
     u = uniforms(rng(seed, "clutter", 0, 1, repeat=repeat), int(step[-1]) + 1 if len(step) else 0)
-    number = poisson_quantiles(alive * (1.0 - q), u)
-    number[:1] = poisson_quantiles(alive, u[:1])
+    alive = values_at(rate, np.arange(len(u)) / per_s) / model.seen
+    number = poisson_counts(alive * (1.0 - q), u)
+    number[:1] = poisson_counts(alive[:1], u[:1])
     for start in np.flatnonzero(number).tolist():
         for nth in range(number[start]):
             stream = rng(seed, "clutter", 1, start, nth, repeat=repeat)
@@ -240,7 +242,8 @@ def false_alarms(
     if sensor.false_alarms is not None and (len(truth.id) or camera is not None):
         known = None if size is None else np.array(size, dtype=float)
         return persistent_false_alarms(truth, sensor, seed, camera, known, repeat)
-    count = false_alarm_counts(sensor.clutter_rate, truth.length, seed, repeat)
+    rate = values_at(sensor.clutter_rate, np.arange(truth.length) / truth.fps)
+    count = false_alarm_counts(rate, seed, repeat)
     frame, u = np.zeros(0, np.int64), np.zeros((0, DRAWS))
     if len(truth.id) or camera is not None:  # else sizes and places are unknown
         for k in range(int(count.max(initial=0))):
@@ -259,13 +262,14 @@ def false_alarms(
     return Readings(frame, pos, None if truth.box is None else box, false_scores(u[:, SCORE_1], sensor), u[:, ORDER_1])
 
 
-def false_alarm_counts(rate: float, length: int, seed: int, repeat: int = 0) -> Ints:
-    """Returns the numbers of false alarms in the frames 1 to `length`, (length,): Poisson with mean `rate`.
+def false_alarm_counts(rate: Array, seed: int, repeat: int = 0) -> Ints:
+    """Returns the number of false alarms in each frame, (F,): Poisson with mean rate (F,).
 
     seed, repeat (number of the suite entry's copy, 0 without copies): name the random stream; with the same stream, a
-    higher rate never gives a smaller number. All are 0 if the rate is 0. Raises ValueError for a negative seed or rate.
+    higher rate never gives a smaller number. It is 0 where the rate is 0. Raises ValueError for a
+    negative seed or rate.
     """
-    return poisson_quantiles(rate, uniforms(rng(seed, "clutter", 0, repeat=repeat), length))
+    return poisson_counts(rate, uniforms(rng(seed, "clutter", 0, repeat=repeat), len(rate)))
 
 
 def _placed_by_view(view: View, frame: Ints, u: Array, fps: float) -> tuple[Array, Array]:

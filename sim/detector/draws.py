@@ -23,7 +23,7 @@ import numpy as np
 
 from sim.elementary import exp
 from sim.rng import autoregression, normals, rng, uniforms
-from sim.types import Array, Detections, Ints, Plane, Truth
+from sim.types import Array, Bools, Detections, Ints, Plane, Truth
 
 if TYPE_CHECKING:
     from scenarios.schema.sensor import Memory, Sensor
@@ -101,6 +101,17 @@ class Readings:
     score: Array
     order: Array
     id: Ints | None = None
+
+
+def in_frames(readings: Readings, looked: Bools) -> Readings:
+    """Returns the readings of those frames in which the detector looked: looked (F,), of the frames 1 to F."""
+    if looked.all():
+        return readings
+    frame = readings.frame
+    kept = (frame >= 1) & (frame <= len(looked)) & looked[np.clip(frame, 1, len(looked)) - 1]
+    box = None if readings.box is None else readings.box[kept]
+    id = None if readings.id is None else readings.id[kept]
+    return Readings(frame[kept], readings.pos[kept], box, readings.score[kept], readings.order[kept], id)
 
 
 def detections_by_frame(true: Readings, false: Readings, truth: Truth) -> tuple[list[Detections], list[Ints]]:

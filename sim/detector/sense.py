@@ -29,6 +29,7 @@ from sim.rng import normals, rng, uniforms
 from sim.scene.body import SHOULDER_SHARE
 from sim.scene.camera import foot_points
 from sim.scene.camera_motion import View, by_frame
+from sim.schedules import at_rows, looked_at
 from sim.types import Array, Bools, Camera, Detections, Ints, Truth
 
 if TYPE_CHECKING:
@@ -69,7 +70,8 @@ def sense_owned(
     alarm."""
     true = _true_detections(truth, sensor, seed, repeat, people or {}, camera)
     false = false_alarms(truth, sensor, seed, camera, image_size, repeat)
-    return draws.detections_by_frame(true, false, truth)
+    looked = looked_at(sensor.every, truth.length, truth.fps)
+    return draws.detections_by_frame(draws.in_frames(true, looked), draws.in_frames(false, looked), truth)
 
 
 def _true_detections(
@@ -84,15 +86,17 @@ def _true_detections(
     if base is not None:
         seen &= np.isfinite(base).all(axis=1)
     n, u = n[seen], u[seen]
-    box = None if base is None else perturb_boxes(base[seen], truth.visibility[seen], sensor.box_noise, n[:, EDGES])
+    visible, times = truth.visibility[seen], (truth.frame[seen] - 1) / truth.fps
+    box = None if base is None else perturb_boxes(base[seen], visible, sensor.box_noise, n[:, EDGES], times)
     if truth.pos is not None:
-        pos = truth.pos[seen] + sensor.noise_m * n[:, POINT] if sensor.noise_m else truth.pos[seen]
+        noise_m = at_rows(sensor.noise_m, truth)[seen, None]
+        pos = truth.pos[seen] + noise_m * n[:, POINT] if sensor.noise_m else truth.pos[seen]
         if base is not None and box is not None and camera is not None:
             pos = _displaced(pos, base[seen], box, truth, seen, sensor, camera)
     else:
         assert box is not None, "labels have positions or boxes"
         pos = box[:, :2] + box[:, 2:] / 2
-    score = draws.true_scores(u[:, SCORE], truth.visibility[seen], sensor)
+    score = draws.true_scores(u[:, SCORE], visible, sensor)
     return Readings(truth.frame[seen], pos, box, score, u[:, ORDER], truth.id[seen])
 
 
@@ -173,7 +177,7 @@ def detection_probability(truth: Truth, sensor: Sensor, camera: View | None = No
     visible = truth.visibility
     curve = sensor.by_visibility
     factor = power(visible, sensor.occlusion_power) if curve is None else draws.interpolated_quantiles(curve, visible)
-    p = sensor.detect_prob * factor
+    p = at_rows(sensor.detect_prob, truth) * factor
     if sensor.small_px and truth.box is not None:
         from_above = isinstance(camera, Camera) and camera.kind == "top"
         size = truth.box[:, 2:].max(axis=1) / SHOULDER_SHARE if from_above else truth.box[:, 3]

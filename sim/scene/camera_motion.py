@@ -24,6 +24,7 @@ from sim.elementary import PI, atan2, dot, length, product, sin, unit
 from sim.rng import rng, uniforms
 from sim.scene.camera import camera_rotation, require_camera
 from sim.scene.camera_placement import pinhole, place_camera
+from sim.schedules import values_at
 from sim.types import Array, Camera, Ints, Motion
 
 if TYPE_CHECKING:
@@ -113,12 +114,16 @@ def _shake(spec: ShakeSpec, rest: Camera, drawn: Array) -> Pose:
     low, high = spec.band
     omega = 2.0 * PI * (low + drawn[:, 0] * (high - low))
     phase = 2.0 * PI * drawn[:, 1]
-    sd = np.array([spec.px / rest.focal_px[0], spec.px / rest.focal_px[1], spec.roll_deg * DEGREE])
+    px = spec.px if isinstance(spec.px, float) else max(spec.px.value)
+    sd = np.array([px / rest.focal_px[0], px / rest.focal_px[1], spec.roll_deg * DEGREE])
     amplitude = sd * np.sqrt(2.0 / WAVES)
 
     def pose(t: float) -> Camera:
         waves = sin(omega * t + phase)
-        right, down, roll = (dot(waves, np.ones_like(waves)) * amplitude).tolist()
+        angles = dot(waves, np.ones_like(waves)) * amplitude
+        if not isinstance(spec.px, float) and px:
+            angles = angles * (values_at(spec.px, np.array([t])) / px)
+        right, down, roll = angles.tolist()
         return rest.replace(rotation=product(turn(right, down, roll), rest.rotation))
 
     return pose

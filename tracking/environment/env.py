@@ -1,56 +1,69 @@
-"""The Gymnasium environment `flockscope/Tuning-v0`: actions set a tracker's parameters, the score is the reward.
+"""The Gymnasium environment `flockscope/Tuning-v0`: actions set a tracker's parameters, its score is the reward.
 
-An episode tracks one whole sequence. An action sets the parameters to search, each in [-1, 1] (see
-tracking.parameter_space). With decision_every=None one action before the first frame sets them all, and the episode is
-one step long. Else an action sets those that may change between frames, every `decision_every` frames. Observations are
-statistics of the run. A step's reward is S(frames so far) - S(frames before it), S being the objective of
-`tracking.evaluate` (mean of HOTA and group_F1), 0 for no frames; the rewards sum to it. `import tracking` registers it.
+An episode tracks one whole sequence. With decision_every=None one action before the first frame sets the parameters,
+and the episode is one step long. Else an action sets those that may change between frames, every `decision_every`
+frames. Observations are statistics of the run, which need no truth (`tracking.running.signals`), and the present
+parameters. S is the objective of `tracking.evaluate` (mean of HOTA and group_F1).
+
+    reward="window"    S(the frames since the last decision and `margin` s before them) times their share of all frames
+    reward="prefix"    S(frames so far) - S(frames before the step); the rewards sum to the objective, but one reward
+                       tells little of one decision: use no discount (gamma = 1)
+
+In an episode of one step both are the objective. `import tracking` registers the environment.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping
-from typing import Any, cast, get_args
+from typing import Any, Literal, cast, get_args
 
 import gymnasium
 import numpy as np
-from gymnasium.spaces import Box
+from gymnasium.spaces import Box, Discrete
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError, OrderError
+from scenarios.limits import is_number
 from scenarios.loading.toml_files import did_you_mean
 from sim.dataset.generate import LEFT_OUT
 from sim.dataset.splits import split_of
 from sim.types import DetectionMode, Tracker
 from tracking.config import Config
-from tracking.environment.observation import NAMES, Observer
-from tracking.episodes.episode import Rollout, streams_for
+from tracking.episodes.episode import AnyTracker, Episode, Rollout, streams_for
 from tracking.episodes.episode_cache import DEFAULT_LIMIT, OpenedSource, SourceCache
 from tracking.episodes.sources import Source, SourceSpec, sources
-from tracking.parameter_space import Space, decode, decode_and_build, space_of
+from tracking.parameter_space import Space, decode_and_build, encode, moved, space_of
 from tracking.running.detection_mode import choose_mode
 from tracking.running.prepare import Params, config_of
+from tracking.running.signals import NAMES, Signals
+from tracking.running.time_limit import TimeLimited
 from tracking.running.tracker_registry import config_class, find
 from tracking.scoring.people import Similarity
 
+Actions = Literal["residual", "absolute", "presets"]
+Reward = Literal["window", "prefix"]
 RESET_OPTIONS = ("scenario", "seed", "params")
+MARGIN = 1.0  # s before a window whose frames are scored with it, so that identities across its edge count
 Floats = NDArray[np.float32]
 
 
-class TuningEnv(gymnasium.Env[Floats, Floats]):
-    """Gymnasium environment: an episode is one run of a tracker, an action sets parameters, the reward is gained score.
+class TuningEnv(gymnasium.Env[Floats, Any]):
+    """Gymnasium environment: an episode is one run of a tracker, an action sets parameters, the reward is its score.
 
-    An action is float32 (P,) in [-1, 1], one number for each of P parameters. An observation is float32 (K,): K
-    statistics of the run in [0, 1].
+    An action is float32 (P,) in [-1, 1], one number for each of P parameters, or the number of a preset. An observation
+    is float32 (K + P,): K statistics of the run in [0, 1], and the present parameters in [-1, 1].
 
     State: sources and their cache; of the episode the config, the rollout (the run, None before it starts) and the
     score so far.
     """
 
     def __init__(
-        self, tracker: str | type[Tracker], suite: SourceSpec | Source = "quick", *, seeds: Iterable[int] = range(100),
+        self, tracker: AnyTracker, suite: SourceSpec | Source = "quick", *, seeds: Iterable[int] = range(100),
         set: Iterable[str] = (), detections: DetectionMode | None = None, similarity: Similarity | None = None,
-        params: Params = None, decision_every: int | None = None, cache: int = DEFAULT_LIMIT, tracker_seed: int = 0,
+        params: Params = None, decision_every: int | None = None, actions: Actions = "residual",
+        presets: Iterable[Params] = (), reward: Reward = "window", margin: float = MARGIN,
+        cache: int | SourceCache = DEFAULT_LIMIT, tracker_seed: int = 0,
     ) -> None:  # fmt: skip
         """Makes the environment; the first episode begins with `reset`.
 
@@ -63,33 +76,51 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
             similarity: How people are compared: "ground", "image" or "boxes"; None: by the data.
             params: Parameters that an episode begins with; the tracker's defaults if None.
             decision_every: Frames between two actions; None: one action per episode.
-            cache: Bytes of sequences that are kept for later episodes.
+            actions: "residual": 0 stands for the parameters that an episode begins with, -1 and 1 for the ends of their
+                ranges; "absolute": -1 and 1 are the ends, whatever the episode begins with; "presets": a number chooses
+                one of `presets`.
+            presets: Parameters to choose from.
+            reward: "window" or "prefix".
+            margin: Of a window, s.
+            cache: Bytes of sequences that are kept for later episodes, or a `SourceCache` to share.
             tracker_seed: Seed of trackers that use random numbers.
 
         Raises:
             InputError: An argument is wrong, no parameter can be searched, a source is unreadable or lacks the
                 detections, or simulated sources have seeds of two splits.
         """
-        _check_choice("detections", detections, (None, *get_args(DetectionMode)))
-        _check_choice("similarity", similarity, (None, *get_args(Similarity)))
-        self.tracker = find(tracker)
+        for place, got, known in (
+            ("detections", detections, (None, *get_args(DetectionMode))), ("actions", actions, get_args(Actions)),
+            ("similarity", similarity, (None, *get_args(Similarity))), ("reward", reward, get_args(Reward)),
+        ):  # fmt: skip
+            _check_choice(place, got, known)
+        if not is_number(margin, 0.0, 3600.0):
+            raise InputError(place="margin", got=repr(margin), expected="seconds from 0 on", remedy="correct it")
+        self.played: AnyTracker = tracker
+        self.tracker = find(tracker.tracker if isinstance(tracker, TimeLimited) else tracker)
         self.decision_every, self.tracker_seed, self.similarity = decision_every, tracker_seed, similarity
+        self.actions, self.reward, self.margin = actions, reward, float(margin)
         self.config_class = config_class(self.tracker, self.tracker.__name__)
         self.defaults = config_of(self.config_class, params)
         self.sources = sources(suite, seeds, set)
         _check_split(self.sources)
         self.mode = _detection_mode(self.tracker, self.sources, detections)
         self.space: Space = _action_parameters(self.config_class, self.mode, decision_every)
-        self.cache = SourceCache(cache)
-        self.observation_space = Box(0.0, 1.0, (len(NAMES),), np.float32)
-        self.action_space = Box(-1.0, 1.0, (len(self.space),), np.float32)
+        self.presets = _presets(self.config_class, actions, presets, self.space, self.defaults)
+        self.cache = cache if isinstance(cache, SourceCache) else SourceCache(cache)
+        low = np.concatenate([np.zeros(len(NAMES)), np.full(len(self.space), -1.0)]).astype(np.float32)
+        self.observation_space = Box(low, np.ones_like(low), dtype=np.float32)
+        self.action_space: Any = Box(-1.0, 1.0, (len(self.space),), np.float32)
+        if actions == "presets":
+            self.action_space = Discrete(len(self.presets))
         self.left_out: dict[Source, str] = {}  # and why: scenes whose script does not come true
         self.source, self.base = self.sources[0], self.defaults
         self._clear_episode()
 
     def _clear_episode(self) -> None:
         self.rollout: Rollout | None = None
-        self._observer: Observer | None = None
+        self._signals: Signals | None = None
+        self._over = False
         self.config, self.score, self.scores, self.refused = self.base, 0.0, dict[str, float](), ""
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
@@ -99,8 +130,8 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
 
         Args:
             seed: Seeds the generator anew; None continues with its present state.
-            options: "scenario" and "seed" restrict the draw to sources of this name and this seed; "params" are the
-                tracker's parameters to begin with.
+            options: "scenario" and "seed" restrict the draw to sources of this name, simulated or stored, and this
+                seed; "params" are the tracker's parameters to begin with.
 
         Returns:
             The observation, and a dict with scenario, seed, frame (number of frames tracked), objective (0 while
@@ -124,52 +155,83 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
             raise InputError(place="decision_every", got=self.tracker.__name__, expected=expected, remedy=remedy)
         self.source, self.base = source, base
         self._clear_episode()
-        self.rollout, self._observer = rollout, Observer(opened.sequence.fps)
+        self.rollout, self._signals = rollout, Signals(opened.sequence.fps)
         return self._observe(), self._info()
 
     def step(self, action: Any) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Sets the parameters and continues tracking, to the end or for `decision_every` frames.
 
         Parameters that contradict each other are moved towards those that the episode began with, until they are valid.
-        If the tracker refuses a config between two frames, it keeps the previous one. After the end of the sequence, a
-        step tracks it again with the new parameters if `decision_every` is None; else it tracks nothing.
+        If the tracker refuses a config between two frames, it keeps the previous one.
 
         Args:
-            action: One number for each parameter, (P,), clipped to [-1, 1].
+            action: One number for each parameter, (P,), clipped to [-1, 1]; or the number of a preset.
 
         Returns:
-            The observation; the reward, which is the objective of all frames so far minus the objective before the
-            step; True if the sequence has ended; False (never truncated); and a dict as `reset` returns it.
+            The observation; the reward; True if the sequence has ended; False (an episode is never cut short); and a
+            dict as `reset` returns it.
 
         Raises:
-            InputError: Before `reset`, for an action of another shape or not finite, or from the tracker.
+            InputError: Before `reset`, after the end, for an action of another shape or not finite, or from the
+                tracker.
             IncomparableError: The tracks cannot be compared with the truth.
             WorkError: The tracker fails.
         """
-        if self._observer is None:
-            raise InputError(place="step", got="no episode", expected="one that was begun", remedy="call reset() first")
+        if self._signals is None or self._over:
+            got = "no episode" if self._signals is None else "an episode that has ended"
+            raise InputError(place="step", got=got, expected="one that was begun", remedy="call reset() first")
         if self.decision_every is None:
-            rollout = decode_and_build(self.space, action, self.base, self._rollout)
+            rollout, first = self._decided(action, self._rollout), 1
             self.rollout, self.config = rollout, cast(Config, rollout.config)
             terminated = self._advance(rollout, None)
         else:
             assert self.rollout is not None
-            rollout, config = self.rollout, decode(self.space, action, self.base)
+            rollout, config = self.rollout, self._decided(action, lambda config: config)
+            config = self.config if config == self.config else config  # trackers keep what they derive of it
+            first = len(rollout.tracks) + 1
             terminated = self._advance_with(rollout, config, len(rollout.tracks) + self.decision_every)
-        self.scores = rollout.scores() if rollout.tracks else {}
-        before, self.score = self.score, self.scores.get("objective", 0.0)
-        return self._observe(), self.score - before, terminated, False, self._info()
+        self._over = terminated
+        reward = self._rewarded(rollout, first, terminated)
+        return self._observe(), reward, terminated, False, self._info()
+
+    def episode(self, every_score: bool = False) -> Episode:
+        """Returns the result of the frames played so far. every_score: as of `tracking.episodes.episode.play`."""
+        assert self.rollout is not None, "an episode was stepped"
+        return self.rollout.episode(every_score)
+
+    def _rewarded(self, rollout: Rollout, first: int, ended: bool) -> float:
+        if self.reward == "prefix" or self.decision_every is None:
+            self.scores = rollout.scores() if rollout.tracks else {}
+            before, self.score = self.score, self.scores.get("objective", 0.0)
+            return self.score - before
+        played = len(rollout.tracks) - first + 1
+        found = rollout.window_objective(first - round(self.margin * rollout.sequence.fps)) if played > 0 else 0.0
+        # nobody to track, and nobody tracked, is right
+        reward = (1.0 if math.isnan(found) else found) * played / rollout.length
+        self.score += reward
+        if ended:
+            self.scores = rollout.scores() if rollout.tracks else {}
+        return reward
+
+    def _decided(self, action: Any, build: Any) -> Any:
+        if self.actions == "presets":
+            if not self.action_space.contains(action):
+                expected = f"a whole number from 0 to {len(self.presets) - 1}"
+                raise InputError(place="action", got=repr(action)[:80], expected=expected, remedy="correct it")
+            return build(self.presets[int(action)])
+        place = moved(self.space, action, self.base) if self.actions == "residual" else action
+        return decode_and_build(self.space, place, self.base, build)
 
     def _rollout(self, config: Config, source: Source | None = None) -> Rollout:
         return Rollout(
-            self.tracker, source or self.source, config, detections=self.mode, tracker_seed=self.tracker_seed,
+            self.played, source or self.source, config, detections=self.mode, tracker_seed=self.tracker_seed,
             cache=self.cache, similarity=self.similarity,
         )  # fmt: skip
 
     def _advance(self, rollout: Rollout, upto: int | None) -> bool:
-        assert self._observer is not None
+        assert self._signals is not None
         for frame, tracks in rollout.advance(upto):
-            self._observer.add(frame, tracks)
+            self._signals.add(frame, tracks)
         done = len(rollout.tracks)
         return done == rollout.length or upto is None or done < upto
 
@@ -216,9 +278,10 @@ class TuningEnv(gymnasium.Env[Floats, Floats]):
         return fitting[int(self.np_random.integers(len(fitting)))]
 
     def _observe(self) -> Floats:
-        assert self._observer is not None
+        assert self._signals is not None
         scale = float("nan") if self.rollout is None else self.rollout.prepared.px_per_m(self.rollout.tracks)
-        return self._observer.statistics(scale)
+        place = np.clip(encode(self.space, self.config), -1.0, 1.0)
+        return np.concatenate([self._signals.statistics(scale), place]).astype(np.float32)
 
     def _info(self) -> dict[str, Any]:
         return {
@@ -261,6 +324,23 @@ def _action_parameters(kind: type[Config], mode: DetectionMode, every: int | Non
         remedy = "declare some in its config (docs/guides/your-own-tracker.md)"
         raise InputError(place="tracker", got=kind.tracker, expected=f"a tracker with {what}", remedy=remedy)
     return space
+
+
+def _presets(
+    kind: type[Config], actions: Actions, presets: Iterable[Params], space: Space, defaults: Config
+) -> tuple[Config, ...]:
+    found = tuple(config_of(kind, one) for one in presets)
+    if (actions == "presets") != bool(found):
+        got = f"{len(found)} presets with actions={actions!r}"
+        raise InputError(place="presets", got=got, expected='some, with actions="presets" alone', remedy="correct it")
+    changeable = {p.name for p in space}
+    for k, one in enumerate(found):
+        fixed = [n for n, v in one.as_dict().items() if n not in changeable and v != getattr(defaults, n)]
+        if fixed:
+            place, got = f"presets[{k}]", f"another {fixed[0]}"
+            remedy = "leave it as in `params`"
+            raise InputError(place=place, got=got, expected="a parameter that may change here", remedy=remedy)
+    return found
 
 
 def _check_choice(place: str, got: object, known: Iterable[object]) -> None:

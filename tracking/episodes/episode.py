@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Mapping
+from collections.abc import Sequence as SequenceOf
 from dataclasses import KW_ONLY, dataclass
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -119,6 +120,8 @@ class Rollout:
         start = time.perf_counter()
         self.prepared.reset(self.tracker_seed)
         self.seconds_tracking = time.perf_counter() - start
+        self._completion, self._completed = self.prepared.completion(objective=True), list[Tracks]()
+        self._fed = 0
         self._frames: Iterator[Frame] | None = None
         self._next: Frame | None = None
 
@@ -163,18 +166,34 @@ class Rollout:
     def scores(self, every: bool = False) -> dict[str, float]:
         """Returns the scores of the frames so far by key, without those that are nan: objective, HOTA and group_F1, or
         if `every` is True all. Raises InputError if tracks and labels cannot be compared."""
+        return self._scores(self._whole(every), range(1, len(self.tracks) + 1), every)
+
+    def window_objective(self, first: int) -> float:
+        """Returns the objective of the frames `first` to the last one played, nan if it is unknown. Groups are those
+        that the tracks from frame 1 on show; what has to wait for the scale or the ground is grouped by what is known
+        so far."""
+        self._completed += self._completion.add(self.tracks[self._fed :])
+        self._fed = len(self.tracks)
+        tracks = self._completed if len(self._completed) == len(self.tracks) else self._whole(every=False)
+        frames = range(max(first, 1), len(self.tracks) + 1)
+        return self._scores(tracks, frames, every=False).get("objective", float("nan"))
+
+    def _whole(self, every: bool) -> SequenceOf[Tracks]:
         from tracking.grouping.foot_points import completed
+
+        known = self.prepared.context
+        return completed(
+            self.tracks, known.fps, self.prepared.px_per_m(self.tracks), camera=known.camera, scene=known.scene,
+            image_size=known.image_size, objective=not every,
+        )[0]  # fmt: skip
+
+    def _scores(self, tracks: SequenceOf[Tracks], frames: range, every: bool) -> dict[str, float]:
         from tracking.running.run import TrackingRun
         from tracking.scoring.people import IncomparableError
 
-        known = self.prepared.context
-        tracks, _ = completed(
-            self.tracks, known.fps, self.prepared.px_per_m(self.tracks), camera=known.camera, scene=known.scene,
-            image_size=known.image_size, objective=not every,
-        )  # fmt: skip
         try:
-            run = TrackingRun(tracks, {"input": self.prepared.input})
-            (compared,) = self.opened.scorer.compare([run], self.similarity, len(run))
+            run = TrackingRun(tuple(tracks), {"input": self.prepared.input})
+            (compared,) = self.opened.scorer.compare([run], self.similarity, frames)
             found: Mapping[str, float] = compared.scores("hull") if every else compared.objective_scores()
         except IncomparableError as error:
             expected, remedy = "what tracks and labels have", "choose another similarity, or other detections"

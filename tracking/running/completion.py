@@ -21,7 +21,7 @@ class Completion:
 
     If the ground under the boxes is known (`ground_below`), groups are derived from positions there. known: the scale
     of tracks in the image; nan: the tracker's own, which `learned` returns, or that of its first boxes. camera, scene,
-    image_size: as of `foot_points.completed`.
+    image_size, objective: as of `foot_points.completed`.
 
     State: waiting, the tracks of frames that are not completed yet; scale, ground, that were found; groups, which
     complete the tracks; velocities, which fill in no more than that; both None until ground and scale are known;
@@ -30,8 +30,9 @@ class Completion:
 
     def __init__(
         self, fps: float, known: ImageScale, learned: Callable[[], float], rule: Grouping | None = None, *,
-        camera: Camera | None, scene: Scene | None, image_size: tuple[int, int] | None = None,
+        camera: Camera | None, scene: Scene | None, image_size: tuple[int, int] | None = None, objective: bool = False,
     ) -> None:  # fmt: skip
+        self.objective = objective
         self.fps, self.known, self.learned, self.rule = fps, known, learned, rule or default_grouping()
         self.camera, self.scene, self.image_size = camera, scene, image_size
         self.waiting, self.scale, self.ground = list[Tracks](), known, Ground()
@@ -87,9 +88,9 @@ class Completion:
         if not any(t.unit == "group" for t in waiting) and not self._moves(waiting[-1]):
             self.ground = ground_below(waiting, self.camera, px_per_m, self.image_size)
         if self.ground.camera is not None:
-            self.groups = GroupsSoFar(self.fps, 1.0, self.rule, places=self._places)
+            self.groups = GroupsSoFar(self.fps, 1.0, self.rule, objective=self.objective, places=self._places)
         elif waiting[0].unit == "person" and (waiting[0].plane != "image" or np.isfinite(px_per_m)):
-            self.groups = GroupsSoFar(self.fps, px_per_m, self.rule)
+            self.groups = GroupsSoFar(self.fps, px_per_m, self.rule, objective=self.objective)
         else:
             self.velocities = Velocities(self.fps)
         return self._completed(waiting)

@@ -93,12 +93,12 @@ class PreparedTracker:
         """Returns the number of px per m that `scale` finds for these tracks; nan if unknown."""
         return self.scale(tracks).px_per_m
 
-    def completion(self, rule: Grouping) -> Completion:
-        """Returns what fills in groups and events of the tracks that `step` returns."""
+    def completion(self, rule: Grouping | None = None, *, objective: bool = False) -> Completion:
+        """Returns what fills in groups and events of the tracks that `step` returns; objective: groups alone."""
         known, context = ImageScale(self.context.px_per_m, self.scale_frames), self.context
         return Completion(
             context.fps, known, self.learned, rule, camera=context.camera, scene=context.scene,
-            image_size=context.image_size,
+            image_size=context.image_size, objective=objective,
         )  # fmt: skip
 
     def learned(self) -> float:
