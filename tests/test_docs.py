@@ -20,10 +20,10 @@ from benchmarks.results import pages
 from scenarios.loading.resolve import names, suite_names
 from sim.dataset.generate import generate
 from tests.processes import ROOT
-from tracking.running.signals import STATISTICS
 from tracking.errors.causes import CAUSES
 from tracking.recordings.source import open_source
 from tracking.running.run import track
+from tracking.running.signals import STATISTICS
 from tracking.running.tracker_registry import find
 from tracking.running.tracker_registry import names as trackers
 from tracking.scoring.catalogue import ALL
