@@ -62,7 +62,7 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
         self, tracker: AnyTracker, suite: SourceSpec | Source = "quick", *, seeds: Iterable[int] = range(100),
         set: Iterable[str] = (), detections: DetectionMode | None = None, similarity: Similarity | None = None,
         params: Params = None, decision_every: int | None = None, actions: Actions = "residual",
-        presets: Iterable[Params] = (), reward: Reward = "window", margin: float = MARGIN,
+        presets: Iterable[Params] = (), reward: Reward = "window", margin: float = MARGIN, every_score: bool = False,
         cache: int | SourceCache = DEFAULT_LIMIT, tracker_seed: int = 0,
     ) -> None:  # fmt: skip
         """Makes the environment; the first episode begins with `reset`.
@@ -82,6 +82,7 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
             presets: Parameters to choose from.
             reward: "window" or "prefix".
             margin: Of a window, s.
+            every_score: True computes all scores of the catalogue at the end of an episode.
             cache: Bytes of sequences that are kept for later episodes, or a `SourceCache` to share.
             tracker_seed: Seed of trackers that use random numbers.
 
@@ -99,7 +100,7 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
         self.played: AnyTracker = tracker
         self.tracker = find(tracker.tracker if isinstance(tracker, TimeLimited) else tracker)
         self.decision_every, self.tracker_seed, self.similarity = decision_every, tracker_seed, similarity
-        self.actions, self.reward, self.margin = actions, reward, float(margin)
+        self.actions, self.reward, self.margin, self.every_score = actions, reward, float(margin), every_score
         self.config_class = config_class(self.tracker, self.tracker.__name__)
         self.defaults = config_of(self.config_class, params)
         self.sources = sources(suite, seeds, set)
@@ -194,14 +195,15 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
         reward = self._rewarded(rollout, first, terminated)
         return self._observe(), reward, terminated, False, self._info()
 
-    def episode(self, every_score: bool = False) -> Episode:
-        """Returns the result of the frames played so far. every_score: as of `tracking.episodes.episode.play`."""
+    def episode(self) -> Episode:
+        """Returns the result of the episode, once it has ended, as `tracking.episodes.episode.play` does."""
         assert self.rollout is not None, "an episode was stepped"
-        return self.rollout.episode(every_score)
+        return self.rollout.episode(self.scores)
 
     def _rewarded(self, rollout: Rollout, first: int, ended: bool) -> float:
+        if ended or self.reward == "prefix":
+            self.scores = rollout.scores(self.every_score and ended) if rollout.tracks else {}
         if self.reward == "prefix" or self.decision_every is None:
-            self.scores = rollout.scores() if rollout.tracks else {}
             before, self.score = self.score, self.scores.get("objective", 0.0)
             return self.score - before
         played = len(rollout.tracks) - first + 1
@@ -209,8 +211,6 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
         # nobody to track, and nobody tracked, is right
         reward = (1.0 if math.isnan(found) else found) * played / rollout.length
         self.score += reward
-        if ended:
-            self.scores = rollout.scores() if rollout.tracks else {}
         return reward
 
     def _decided(self, action: Any, build: Any) -> Any:

@@ -88,7 +88,7 @@ def play(
     )
     for _ in rollout.advance():
         pass
-    return rollout.episode(every_score)
+    return rollout.episode(rollout.scores(every_score))
 
 
 @dataclass(eq=False)
@@ -157,9 +157,8 @@ class Rollout:
             self._next = None
             yield frame, tracks
 
-    def episode(self, every_score: bool = False) -> Episode:
-        """Returns the result of the frames played so far. every_score: as in `play`."""
-        scores = self.scores(every_score)
+    def episode(self, scores: dict[str, float]) -> Episode:
+        """Returns the result of the frames played so far. scores: those of `scores`."""
         objective, source = scores.get("objective", float("nan")), self.source
         return Episode(source.name, source.seed, objective, scores, len(self.tracks), self.seconds_tracking)
 

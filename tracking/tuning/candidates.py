@@ -31,7 +31,7 @@ from tracking.stats import few, mean_of_known, paired
 if TYPE_CHECKING:
     import optuna
 
-    from tracking.episodes.parallel_episodes import PlayEpisodes
+    from tracking.tuning.episode_player import PlayEpisodes
     from tracking.tuning.search_plan import SearchPlan
 
 SPEED = "frames/s"  # Key of the tracker's speed. It is the only goal that differs between two runs of the same episode.

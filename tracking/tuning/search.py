@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any
 from scenarios.errors import counted, extra_needed
 from sim.store.own_files import Marks, output_file, refuse_foreign_file
 from sim.types import Tracker
-from tracking.episodes.parallel_episodes import episode_player
 from tracking.keyword_options import documented
 from tracking.stats import FEWEST
 from tracking.tuning.candidates import Candidate, Goal, HeldOutEvaluator, TrialRecord, pareto_front
+from tracking.tuning.episode_player import episode_player
 from tracking.tuning.options import Scenes, TuneOptions
 from tracking.tuning.result import TuningResult
 from tracking.tuning.search_plan import SearchPlan, search_plan

@@ -33,10 +33,10 @@ from optuna.trial import FrozenTrial, TrialState
 
 from scenarios.errors import FlockscopeError, InputError
 from tracking.episodes.episode import Episode
-from tracking.episodes.parallel_episodes import PlayEpisodes
 from tracking.running.used_files import UsedFiles, changes, relative
 from tracking.stats import mean_of_known
 from tracking.tuning.candidates import STORED, TrialRecord
+from tracking.tuning.episode_player import PlayEpisodes
 from tracking.tuning.options import Progress
 from tracking.tuning.sampler import PRUNED, distribution, propose, should_prune, tpe_sampler
 from tracking.tuning.search_plan import SearchPlan

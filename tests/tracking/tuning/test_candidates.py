@@ -105,6 +105,6 @@ def test_the_same_command_again_plays_nothing(tmp_path, monkeypatch):
     def never(*_):
         raise AssertionError("an episode was played")
 
-    monkeypatch.setattr("tracking.episodes.parallel_episodes.play_task", never)
+    monkeypatch.setattr("tracking.tuning.episode_player.stepped", never)
     assert str(tune(**given, out=tmp_path / "toy.toml")) == str(first)
     assert (tmp_path / "toy.json").read_bytes() == content

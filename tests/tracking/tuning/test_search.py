@@ -15,24 +15,24 @@ from scenarios.errors import FlockscopeError, InputError
 from tests.processes import ROOT
 from tests.toy_tracker import Toy, ToyConfig
 from tests.tuning_toys import TOY, toy_plan, tune_arguments
-from tracking.episodes.parallel_episodes import episode_player
+from tracking.tuning.episode_player import episode_player
 from tracking.tuning.search import tune
 from tracking.tuning.study import LEFT_OUT, open_study, run_trials
 
 KILLED_AT = """
 import os, signal, sys
 from pathlib import Path
-import tracking.episodes.parallel_episodes as work
+import tracking.tuning.episode_player as work
 from tests.tuning_toys import toy_plan, tune_arguments
 from tracking.tuning.search import tune
-played, attempt = 0, work.play_task
+played, attempt = 0, work.stepped
 def counted(*given):
     global played
     played += 1
     if played == int(sys.argv[2]):
         os.kill(os.getpid(), signal.SIGKILL)
     return attempt(*given)
-work.play_task = counted
+work.stepped = counted
 folder = Path(sys.argv[1])
 tune(**tune_arguments(folder), out=folder / sys.argv[3], storage=sys.argv[4], study="toy")
 """
