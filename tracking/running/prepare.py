@@ -22,7 +22,7 @@ from scenarios.limits import INTEGER, JSON_BYTES
 from scenarios.reading import parse_json
 from sim.pictures.background_sample import untracked_frames
 from sim.types import Context, DetectionMode, Detections, Frame, Ints, Sequence, Tracker, Tracks
-from tracking.config import Config
+from tracking.config import Config, file_of
 from tracking.grouping.grouping_choice import Grouping
 from tracking.running import image_scale, tracker_registry
 from tracking.running.completion import Completion
@@ -38,6 +38,7 @@ from tracking.running.detection_mode import (
 )
 from tracking.running.image_scale import ImageScale
 from tracking.running.plane_check import PlaneCheck
+from tracking.running.policy import FollowedPolicy, Policy, read_policy
 from tracking.running.time_limit import TimeLimited
 from tracking.running.tracks_check import ReportHistory, check_tracks
 from tracking.running.used_files import inside, owner_of
@@ -45,8 +46,8 @@ from tracking.user_code import tracker_failed, user_code
 
 PICTURED = ("image", "both")  # Modes in which a tracker gets pictures.
 DIAGNOSTICS = JSON_BYTES // 8  # characters; run.json has indented lines
-# A config, parameter values by name, the name of a preset, the path of a TOML file, or None for the defaults.
-Params = Config | Mapping[str, Any] | str | Path | None
+# A config, parameter values by name, a policy, the name of a preset, the path of a TOML file, or None for the defaults.
+Params = Config | Mapping[str, Any] | Policy | str | Path | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +66,7 @@ class PreparedTracker:
     scale_frames: int = 0  # as of ImageScale
     untracked: int = 0  # first frames, in which a background is learned and nobody is tracked
     masked: Sequence | None = None  # `sequence` with pictures that are black outside the region that counts
+    followed: FollowedPolicy | None = None  # what changes the parameters meanwhile
     history: ReportHistory = field(default_factory=ReportHistory)  # what the tracker has reported since `reset`
     planes: PlaneCheck = field(default_factory=PlaneCheck)  # the same, compared with its input
 
@@ -112,6 +114,8 @@ class PreparedTracker:
         self.planes.clear()
         with self._naming("reset()", self.sequence.name):
             self.tracker.reset(self.context, seed)
+        if self.followed is not None:
+            self.followed.begin(self.tracker)
 
     def step(self, frame: Frame) -> Tracks:
         """Returns the tracker's tracks of the frame, checked; call it with the frames of `frames`, in order. Raises
@@ -119,10 +123,14 @@ class PreparedTracker:
         detections = frame.detections
         if detections is not None:
             check_detections(detections, self.tracker.needs)
+        if self.followed is not None:
+            self.followed.before(self.tracker)
         with self._naming("step()", f"{self.sequence.name}, frame {frame.index}"):
             tracks = self.tracker.step(frame, detections)
         checked = check_tracks(tracks, frame.index, self.name, self.sequence.name, self.history)
         self.planes.check(checked, detections, self.context, self.name, self.sequence.name)
+        if self.followed is not None:
+            self.followed.after(frame, checked)
         return checked
 
     def diagnostics(self, place: str) -> Any:
@@ -199,7 +207,8 @@ def prepare(
     if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or not 0 <= seed <= INTEGER:
         expected, remedy = f"a whole number from 0 to {INTEGER}", "give a smaller one, such as 0"
         raise InputError(place="--seed", got=repr(seed), expected=expected, remedy=remedy)
-    name, instance, config = _make(tracker, params)
+    policy = _policy(tracker, params)
+    name, instance, config = _make(tracker, params if policy is None else policy.base)
     mode = choose_mode(instance.needs, sequence, detections)
     if sensor and mode != "truth":
         remedy = "add --detections truth, or leave out the sensor settings"
@@ -227,8 +236,18 @@ def prepare(
     context = Context(sequence.fps, scale.px_per_m, sequence.camera, sequence.scene, sequence.image_size, background)
     untracked = untracked_frames(sequence.load_background) if mode in PICTURED else 0
     return PreparedTracker(
-        name, instance, config, context, mode, sequence, frames, given, scale.frames, untracked, masked
-    )
+        name, instance, config, context, mode, sequence, frames, given, scale.frames, untracked, masked,
+        None if policy is None else FollowedPolicy(policy, sequence.fps, scale.px_per_m),
+    )  # fmt: skip
+
+
+def _policy(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> Policy | None:
+    """Returns the policy that `params` are or that they name, None if they are parameters."""
+    given = tracker.tracker if isinstance(tracker, TimeLimited) else tracker
+    if isinstance(params, Policy) or not isinstance(params, str | Path) or not isinstance(given, str | type):
+        return params if isinstance(params, Policy) else None
+    kind: type[Config] | None = getattr(tracker_registry.find(given), "config_class", None)
+    return None if kind is None else read_policy(kind, file_of(kind.tracker, params))
 
 
 def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> tuple[str, Tracker, Config | None]:

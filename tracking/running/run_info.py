@@ -42,6 +42,7 @@ def run_info(
     return {
         "tracker": prepared.name,
         "config": prepared.config.as_dict() if prepared.config else {},
+        **({} if prepared.followed is None else {"policy": prepared.followed.policy.as_dict()}),
         "seed": seed,
         "detections": prepared.mode,
         "detections_hash": stored and detections_hash(stored.detections),
