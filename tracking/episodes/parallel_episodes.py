@@ -14,6 +14,7 @@ from sim.workers.calls import RunItems
 from tracking.episodes.episode import Episode, Source, SourceCache, play
 from tracking.episodes.tuned_tracker import RULE, TunedTracker
 from tracking.grouping.link_rule import LinkRule
+from tracking.running.policy import Policy
 from tracking.running.time_limit import TimeLimited
 from tracking.running.tracker_registry import find
 from tracking.running.used_files import code_of, used
@@ -32,6 +33,7 @@ class EpisodeTask:
     detections: DetectionMode
     every_score: bool
     similarity: Similarity | None = None
+    policy: Policy | None = None  # in place of `values`
 
 
 EpisodeOrError = Episode | FlockscopeError
@@ -71,7 +73,7 @@ def play_task(task: EpisodeTask) -> EpisodeOrError:
 
             return play_rule(source, LinkRule.from_dict(task.values), cache)
         return play(
-            tracker, source, task.values or None, detections=task.detections,
+            tracker, source, task.policy or task.values or None, detections=task.detections,
             tracker_seed=source.seed, cache=cache, every_score=task.every_score, similarity=task.similarity,
         )  # fmt: skip
     except OrderError as error:  # the scene's fault, whatever the parameters

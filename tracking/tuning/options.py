@@ -43,6 +43,9 @@ class TuneOptions:
     set: Iterable[str] = option(
         "Fixed values: gate=0.99 of the tracker, scenario.… and sensor.… of scenes.", (), metavar="K=V")
     only: Iterable[str] = option("Parameters to search; all tunable ones if absent.", (), metavar="A,B,…")
+    adaptive: int | None = option(
+        "Fit a policy, too, which changes parameters by what the tracker sees, from so many configs.", None, low=6,
+        metavar="N")
     out: str | Path | None = option(
         "File for the parameters; figures, plots and study lie beside it.", None, metavar="FILE.toml")
     storage: str | Path | None = option(

@@ -20,6 +20,7 @@ from sim.hashing import installed
 from sim.store.atomic import write_file
 from sim.store.tables import plain
 from tracking.config import Config
+from tracking.tuning.adaptive_search import Adapted
 from tracking.tuning.candidates import Candidate, Comparison, TrialRecord
 from tracking.tuning.search_plan import SearchPlan, seeds_text
 
@@ -111,6 +112,7 @@ class TuningResult:
         validation: The values on the validation scenes, one per goal: a tuple of the defaults, then of the winner.
         notes: Remarks for the reader.
         left_out: A line for each scene whose script did not come true.
+        adapted: The policy that was searched on top of the config, and its comparisons with it; None if none was.
         taken_over: The number of "trials" and of held-out "episodes" that an earlier call had stored, and when the last
             trial was "stored", None if there was none. It stands in no file.
     """
@@ -126,6 +128,7 @@ class TuningResult:
     notes: tuple[str, ...] = ()
     left_out: tuple[str, ...] = ()
     taken_over: Mapping[str, Any] = field(default_factory=dict)
+    adapted: Adapted | None = None
 
     @property
     def default(self) -> Config:
@@ -173,6 +176,8 @@ class TuningResult:
         if chosen is not None:
             return [*lines, f"one of {len(self.front)} that no other trial beats by all goals"]
         lines += [c.line() for c in self.comparisons]
+        lines += [] if self.adapted is None else [f"policy on {c.line()}" for c in self.adapted.comparisons]
+        lines += [] if self.adapted is None else [self.adapted.line]
         return [*lines, *self.notes, *(f"left out: {scene}" for scene in self.left_out)]
 
     def to_toml(self, chosen: Candidate | None = None) -> str:
@@ -208,6 +213,7 @@ class TuningResult:
             "candidates": [_candidate(c) for c in self.candidates],
             "front": [_candidate(c) for c in self.front],
             "importance": dict(self.importance),
+            "policy": None if self.adapted is None else _adapted(self.adapted),
             "notes": list(self.notes),
             "left_out": list(self.left_out),
             "versions": installed(PACKAGES),
@@ -219,6 +225,8 @@ class TuningResult:
         target = Path(path)
         files = {".json": json.dumps(plain(self.as_dict()), indent=1, allow_nan=False) + "\n", **self.plots()}
         files |= {f".front-{k}.toml": self.to_toml(c) for k, c in enumerate(self.front, 1)}
+        if self.adapted is not None and self.adapted.policy is not None:
+            files[".policy.toml"] = self.adapted.policy.to_toml()
         for suffix, content in files.items():
             write_file(target.with_suffix(suffix), content.encode())
         write_file(target, self.to_toml().encode())
@@ -231,6 +239,12 @@ class TuningResult:
         if any(self.importance.values()):
             plots[".importance.svg"] = importance_plot(self.plan, self.importance)
         return plots
+
+
+def _adapted(found: Adapted) -> dict[str, Any]:
+    kept = None if found.policy is None else found.policy.as_dict()
+    compared = [{**asdict(c), "indicative": c.indicative, "verdict": c.verdict} for c in found.comparisons]
+    return {"kept": kept, "comparisons": compared, "why": found.line}
 
 
 def _candidate(candidate: Candidate) -> dict[str, Any]:

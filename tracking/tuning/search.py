@@ -21,6 +21,7 @@ from sim.store.own_files import Marks, output_file, refuse_foreign_file
 from sim.types import Tracker
 from tracking.keyword_options import documented
 from tracking.stats import FEWEST
+from tracking.tuning.adaptive_search import adapted, online_space
 from tracking.tuning.candidates import Candidate, Goal, HeldOutEvaluator, TrialRecord, pareto_front
 from tracking.tuning.episode_player import episode_player
 from tracking.tuning.options import Scenes, TuneOptions
@@ -65,6 +66,8 @@ def _search(options: TuneOptions) -> TuningResult:
     from tracking.tuning.study import open_study, run_trials
 
     plan = search_plan(options)
+    if options.adaptive is not None:
+        online_space(plan)
     progress = options.progress or (lambda finished, trials, text: None)
     most = options.finalists + 1 if len(plan.goals) > 1 else 0
     target = None if options.out is None else _checked_target(Path(options.out), most)
@@ -82,6 +85,8 @@ def _search(options: TuneOptions) -> TuningResult:
         evaluator = HeldOutEvaluator(plan, play, study.optuna, report)
         evaluator.count(plan.training, study.left_out())
         found = replace(_evaluated(plan, study, evaluator), taken_over=taken_over)
+    if options.adaptive is not None:
+        found = replace(found, adapted=adapted(plan, found.config, options.adaptive, report))
     if target is not None:
         found.write(target)
     evaluator.require_most()
