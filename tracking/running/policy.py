@@ -113,9 +113,8 @@ def read_policy(kind: type[Config], path: str | Path) -> Policy | None:
     if name != kind.tracker:
         remedy = "give the file to the tracker it was made for"
         raise InputError(file=path, place="tracker", got=repr(name), expected=kind.tracker, remedy=remedy)
-    if content or not all(
-        isinstance(t, dict) for t in (values, rows, *(rows.values() if isinstance(rows, dict) else ()))
-    ):
+    tables = (values, rows, *(rows.values() if isinstance(rows, dict) else ()))
+    if content or not all(isinstance(table, dict) for table in tables):
         got, remedy = ", ".join(content) or "policy", "see tracking/running/policy.py"
         raise InputError(file=path, got=got, expected="tracker, every, memory, [params], [policy.…]", remedy=remedy)
     try:
