@@ -102,7 +102,7 @@ def fitted_policy(
 def smoothed(values: Array) -> Array:
     """Returns values (C, T) averaged over NEAR of their neighbours in time on either side."""
     padded = np.pad(values, ((0, 0), (NEAR, NEAR)), mode="edge")
-    return np.mean([padded[:, k : k + values.shape[1]] for k in range(2 * NEAR + 1)], axis=0)
+    return np.asarray(np.mean([padded[:, k : k + values.shape[1]] for k in range(2 * NEAR + 1)], axis=0))
 
 
 def constant(base: Config, space: Space, residual: Array) -> Config:

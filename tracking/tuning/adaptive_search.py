@@ -140,8 +140,8 @@ def _windows(run: RunItems, plan: SearchPlan, policy: Policy, offset: Array) -> 
 def _episodes(run: RunItems, plan: SearchPlan, sources: Sequence[Source], policy: Policy) -> Iterator[Episode]:
     from sim.workers.start import results_in_order
 
-    given = ({}, plan.detections, False, plan.options.similarity, policy)
-    tasks = [EpisodeTask(plan.tracker, source, *given) for source in sources]
+    more = (plan.detections, False, plan.options.similarity, policy)
+    tasks = [EpisodeTask(plan.tracker, source, {}, *more) for source in sources]
     for result in results_in_order(run, play_task, tasks, _lost_episode):
         if isinstance(result, FlockscopeError):
             raise result
