@@ -46,6 +46,7 @@ STATISTICS = (
     Statistic("score_high", None, "share", "scores of the detections, 90 % quantile"),
     Statistic("tracks", 10.0, "", "tracks of a frame, mean"),
     Statistic("associated", None, "share", "detections that belong to a track"),
+    Statistic("extra", 1.0, "", "detections of a frame that belong to no track, mean over frames that have some"),
     Statistic("found", None, "share", "tracks that have a detection, in frames that have some"),
     Statistic("coasting", None, "share", "tracks that the tracker says it only predicted"),
     Statistic("gap", 0.5, "s", "time since the last detection of a track, mean"),
@@ -157,7 +158,8 @@ class Signals:
         if some:
             low, middle, high = np.quantile(np.concatenate(self._scores), [0.1, 0.5, 0.9]).tolist()
             values |= {"detections": total / some, "score_low": low, "score": middle, "score_high": high}
-            values["associated"] = min(self._belong / total, 1.0)
+            values["associated"] = self._belong / total
+            values["extra"] = (total - self._belong) / some
         if self._of:
             values["found"] = self._have / self._of
         for name, squares in (("residual", self._residuals), ("shift", self._shifts)):

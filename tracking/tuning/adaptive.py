@@ -29,6 +29,7 @@ SPREAD, CHANGED = (
 )  # standard deviation of drawn residuals, and share of the parameters that each config changes
 NEAR = 1  # windows before and after over which advantages are averaged
 LEAST_SD = 1e-3  # of a statistic: one that varies less tells nothing
+UNTOLD = "time", "since", "rate"  # statistics that do not depend on what is seen: they would be learned by heart
 LEAST_WEIGHT = 0.005  # of a standardised statistic: smaller ones are left out of the policy
 
 
@@ -86,7 +87,7 @@ def fitted_policy(
             aims.append(aim)
     x, y = np.concatenate(seen), np.concatenate(aims)
     mean, sd = x.mean(axis=0), x.std(axis=0)
-    tells = sd > LEAST_SD
+    tells = (sd > LEAST_SD) & ~np.isin(NAMES, UNTOLD)
     z = np.where(tells, (x - mean) / np.where(tells, sd, 1.0), 0.0)
     solved = np.linalg.solve(z.T @ z + ridge * len(z) * np.eye(z.shape[1]), z.T @ (y - y.mean(axis=0)))
     solved[np.abs(solved) < LEAST_WEIGHT] = 0.0
