@@ -171,15 +171,22 @@ class Rollout:
         """Returns the objective of the frames `first` to the last one played, nan if it is unknown. Groups are those
         that the tracks from frame 1 on show; what has to wait for the scale or the ground is grouped by what is known
         so far."""
-        self._completed += self._completion.add(self.tracks[self._fed :])
-        self._fed = len(self.tracks)
-        tracks = self._completed if len(self._completed) == len(self.tracks) else self._whole(every=False)
+        tracks = self._grouped()
+        if len(tracks) < len(self.tracks):
+            tracks = self._whole(every=False)
         frames = range(max(first, 1), len(self.tracks) + 1)
         return self._scores(tracks, frames, every=False).get("objective", float("nan"))
+
+    def _grouped(self) -> SequenceOf[Tracks]:
+        self._completed += self._completion.add(self.tracks[self._fed :])
+        self._fed = len(self.tracks)
+        return self._completed
 
     def _whole(self, every: bool) -> SequenceOf[Tracks]:
         from tracking.grouping.foot_points import completed
 
+        if not every and self._fed and len(self._grouped()) == len(self.tracks):
+            return self._completed
         known = self.prepared.context
         return completed(
             self.tracks, known.fps, self.prepared.px_per_m(self.tracks), camera=known.camera, scene=known.scene,
