@@ -23,10 +23,7 @@ from tracking.parameter_space import Space, decode, moved
 from tracking.running.policy import BIAS, Policy, averaged
 from tracking.running.signals import NAMES
 
-SPREAD, CHANGED = (
-    0.6,
-    0.5,
-)  # standard deviation of drawn residuals, and share of the parameters that each config changes
+SPREAD, CHANGED = 0.4, 0.35  # standard deviation of drawn residuals; share of the parameters that each changes
 NEAR = 1  # windows before and after over which advantages are averaged
 LEAST_SD = 1e-3  # of a statistic: one that varies less tells nothing
 UNTOLD = "time", "since", "rate"  # statistics that do not depend on what is seen: they would be learned by heart

@@ -1,0 +1,48 @@
+"""`tune --adaptive` on a toy: a policy is kept only if it surely helps, and what it cannot do is said at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from scenarios.errors import InputError
+from tests.tuning_toys import toy_plan, tune_arguments
+from tracking.running.policy import Policy, read_policy
+from tracking.tuning import adaptive_search
+from tracking.tuning.adaptive_search import adapted
+from tracking.tuning.search import tune
+
+
+def quiet(text: str) -> None:
+    pass
+
+
+def test_where_nothing_changes_the_constant_stays(tmp_path: Path) -> None:
+    found = tune(**tune_arguments(tmp_path, objective=(), adaptive=6, trials=8), out=tmp_path / "toy.toml")
+    assert found.adapted is not None
+    assert found.adapted.policy is None
+    assert found.adapted.line.startswith("the constant stays: ")
+    assert found.adapted.line in (tmp_path / "toy.toml").read_text()
+    assert not (tmp_path / "toy.policy.toml").exists()
+
+
+def test_a_policy_that_surely_helps_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The defaults of the toy are bad: a policy that only lengthens its reach helps in every scene."""
+    monkeypatch.setattr(adaptive_search, "FITS", ((0.02, 0.02),))
+    monkeypatch.setattr(
+        adaptive_search, "fitted_policy", lambda base, *_: Policy(base, 2.0, 2.0, {"reach": {"bias": 0.5}})
+    )
+    plan = toy_plan(tmp_path, objective=(), adaptive=6)
+    found = adapted(plan, plan.base, 6, quiet)
+    assert found.policy is not None
+    assert [c.scenes for c in found.comparisons] == ["validation", "one.toml", "two.toml"]
+    assert all(c.verdict == "better" for c in found.comparisons)
+    (tmp_path / "p.toml").write_text(found.policy.to_toml())
+    assert read_policy(type(plan.base), tmp_path / "p.toml") == found.policy
+
+
+def test_what_cannot_be_adapted_is_said_before_anything_is_played(tmp_path: Path) -> None:
+    for more, words in (({"objective": "HOTA"}, "objective"), ({"objective": (), "adaptive": 3}, "6")):
+        with pytest.raises(InputError, match=words):
+            tune(**tune_arguments(tmp_path, **{"adaptive": 6, **more}))
