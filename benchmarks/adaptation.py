@@ -13,7 +13,7 @@ hindsight        for each part of each entry of `drift` the config that was best
                  the parts begin, which no tracker knows: what could be gained
 rule             three lines: the noise of positions follows the residuals, the probability of detection the share of
                  tracks that are found, false alarms the detections that belong to no track
-policy           linear, by reward-weighted regression (`tracking.tuning.adaptive`), as `tune --adaptive` finds it
+policy           linear, from a response surface (`tracking.tuning.adaptive`), as `tune --adaptive` finds it
 --out: what the policy does in the first test episode, as a picture.
 """
 

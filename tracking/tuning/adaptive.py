@@ -1,11 +1,15 @@
 """Fits a linear policy (`tracking.running.policy`) by playing episodes of the environment that change meanwhile (ours).
 
-Reward-weighted regression (Peters and Schaal 2007). Configs are drawn round the one to begin with, and each plays all
-training scenes as a constant, with a decision in each window of `every` s. In a window w of a scene, a config c has the
-score S_wc. Its advantage is A_wc = S_wc - mean_c S_wc, averaged over NEAR windows before and after. The parameters to
-aim at in a window are the mean of all configs' residuals under the weights exp(A_wc / temperature), less their mean
-under equal weights, so that a parameter without effect stays. A ridge regression then tells these from the statistics
-that were seen before the window, under any of the configs. So no scene need tell when or how it changes.
+Configs are drawn round the one to begin with, and each plays all training scenes as a constant, with a decision in each
+window of `every` s. The score of a window under a config with the residuals u_p, before which the statistics z_k were
+seen (standardised, z_0 = 1), is taken as a response surface (Box and Wilson 1951):
+
+    S = S_w + sum_p [ u_p sum_k g_pk z_k - h_p u_p² ]
+
+S_w, what the window itself gives, is the mean over configs and falls out of the differences from it. g and h follow by
+ridge regression over all windows, scenes and configs. The surface is highest at u_p = sum_k g_pk z_k / (2 h_p), which
+is the policy. h_p is at least `curvature`, so that a parameter without effect stays. So no scene need tell when or how
+it changes.
 """
 
 from __future__ import annotations
@@ -24,7 +28,6 @@ from tracking.running.policy import BIAS, Policy, averaged
 from tracking.running.signals import NAMES
 
 SPREAD, CHANGED = 0.4, 0.35  # standard deviation of drawn residuals; share of the parameters that each changes
-NEAR = 1  # windows before and after over which advantages are averaged
 LEAST_SD = 1e-3  # of a statistic: one that varies less tells nothing
 UNTOLD = "time", "since", "rate"  # statistics that do not depend on what is seen: they would be learned by heart
 LEAST_WEIGHT = 0.005  # of a standardised statistic: smaller ones are left out of the policy
@@ -69,38 +72,31 @@ def drawn_residuals(space: Space, count: int, random: np.random.Generator) -> Ar
 
 def fitted_policy(
     base: Config, space: Space, every: float, memory: float, residuals: Array, played: Sequence[Sequence[Played]],
-    temperature: float, ridge: float,
+    ridge: float, curvature: float,
 ) -> Policy:  # fmt: skip
     """Returns the policy fitted to episodes: played[c][s] is that of config c, with residuals (C, P), on scene s."""
-    aims, seen = list[Array](), list[Array]()
-    for s in range(len(played[0])):
-        score = np.array([each[s].score for each in played])  # (C, T)
-        advantage = smoothed(score - score.mean(axis=0))
-        weight = np.exp((advantage - advantage.max(axis=0)) / temperature)
-        weight /= weight.sum(axis=0)
-        aim = np.einsum("ct,cp->tp", weight - 1.0 / len(weight), residuals)
-        for each in played:
-            seen.append(each[s].seen[:-1])
-            aims.append(aim)
-    x, y = np.concatenate(seen), np.concatenate(aims)
-    mean, sd = x.mean(axis=0), x.std(axis=0)
-    tells = (sd > LEAST_SD) & ~np.isin(NAMES, UNTOLD)
-    z = np.where(tells, (x - mean) / np.where(tells, sd, 1.0), 0.0)
-    solved = np.linalg.solve(z.T @ z + ridge * len(z) * np.eye(z.shape[1]), z.T @ (y - y.mean(axis=0)))
-    solved[np.abs(solved) < LEAST_WEIGHT] = 0.0
+    seen = np.concatenate(
+        [[one.seen[:-1] for one in scene] for scene in zip(*played, strict=True)], axis=1
+    )  # (C, N, K)
+    score = np.concatenate([[one.score for one in scene] for scene in zip(*played, strict=True)], axis=1)  # (C, N)
+    mean, sd = seen.mean(axis=(0, 1)), seen.std(axis=(0, 1))
+    tells = np.flatnonzero((sd > LEAST_SD) & ~np.isin(NAMES, UNTOLD))
+    z = np.concatenate([np.ones((*score.shape, 1)), (seen[..., tells] - mean[tells]) / sd[tells]], axis=2)
+    u, parts = residuals[:, None], z.shape[2]
+    linear = (u[..., :, None] * z[..., None, :]).reshape(*score.shape, -1)
+    surface = np.concatenate([linear, np.broadcast_to(-np.square(u), (*score.shape, len(space)))], axis=2)
+    x, y = (each - each.mean(axis=0) for each in (surface, score))
+    x, y = x.reshape(-1, x.shape[2]), y.ravel()
+    solved = np.linalg.solve(x.T @ x + ridge * len(x) * np.eye(x.shape[1]), x.T @ y)
+    slope, bend = solved[: -len(space)].reshape(len(space), parts), np.maximum(solved[-len(space) :], curvature)
+    aim = slope / (2.0 * bend[:, None])
     rows = {}
-    for k, p in enumerate(space):
-        weights = {NAMES[j]: float(w / sd[j]) for j, w in enumerate(solved[:, k]) if w}
-        bias = float(y[:, k].mean() - sum(w * mean[NAMES.index(name)] for name, w in weights.items()))
-        if weights or abs(bias) > LEAST_WEIGHT:
-            rows[p.name] = {BIAS: round(bias, 6), **{name: round(w, 6) for name, w in weights.items()}}
+    for p, (first, *others) in zip(space, aim.tolist(), strict=True):
+        weights = {NAMES[k]: w / sd[k] for k, w in zip(tells, others, strict=True) if abs(w) > LEAST_WEIGHT}
+        bias = first - sum(w * mean[NAMES.index(name)] for name, w in weights.items())
+        if weights or abs(first) > LEAST_WEIGHT:
+            rows[p.name] = {BIAS: round(float(bias), 4), **{name: round(float(w), 4) for name, w in weights.items()}}
     return Policy(base, every, memory, rows)
-
-
-def smoothed(values: Array) -> Array:
-    """Returns values (C, T) averaged over NEAR of their neighbours in time on either side."""
-    padded = np.pad(values, ((0, 0), (NEAR, NEAR)), mode="edge")
-    return np.asarray(np.mean([padded[:, k : k + values.shape[1]] for k in range(2 * NEAR + 1)], axis=0))
 
 
 def constant(base: Config, space: Space, residual: Array) -> Config:

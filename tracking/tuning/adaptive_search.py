@@ -30,7 +30,7 @@ from tracking.tuning.search_plan import SearchPlan
 
 EVERY, MEMORY = 2.0, 2.0  # s from one decision to the next, and over which statistics are averaged
 FEWEST = 6  # configs of which a policy can be fitted
-FITS = tuple((temperature, ridge) for temperature in (0.02, 0.05) for ridge in (0.02, 0.2))
+FITS = tuple((ridge, curvature) for ridge in (1e-4, 1e-3) for curvature in (0.05, 0.2))  # of `fitted_policy`
 
 
 @dataclass(frozen=True)
@@ -104,9 +104,9 @@ def adapted(plan: SearchPlan, config: Config, configs: int, report: Callable[[st
             return Adapted(None, (), "the constant stays: no training scene can be played")
         played = [[one for s in known if (one := row[s]) is not None] for row in pool]
         best, most = still, float(np.nanmean([one.objective for one in played[0]]))
-        for k, (temperature, ridge) in enumerate(FITS):
+        for k, fit in enumerate(FITS):
             report(f"policy: fits, {k + 1} of {len(FITS)}")
-            made = fitted_policy(config, space, EVERY, MEMORY, residuals, played, temperature, ridge)
+            made = fitted_policy(config, space, EVERY, MEMORY, residuals, played, *fit)
             again = [one.objective for one in _windows(run, plan, made, np.zeros(len(made.space))) if one is not None]
             if np.nanmean(again) > most:
                 best, most = made, float(np.nanmean(again))

@@ -8,7 +8,7 @@ import pytest
 from tracking.papers.blob.config import BlobConfig
 from tracking.parameter_space import encode, space_of
 from tracking.running.signals import NAMES
-from tracking.tuning.adaptive import Played, constant, drawn_residuals, fitted_policy, smoothed
+from tracking.tuning.adaptive import Played, constant, drawn_residuals, fitted_policy
 
 SPACE = tuple(
     p for p in space_of(BlobConfig, "file", online=True) if p.name in ("gate", "position_noise", "size_noise")
@@ -38,14 +38,14 @@ def pool(residuals: np.ndarray, scenes: int = 6, windows: int = 40) -> list[list
 
 def test_it_finds_what_is_good_where() -> None:
     residuals = drawn_residuals(SPACE, 40, np.random.default_rng(1))
-    policy = fitted_policy(BlobConfig(), SPACE, 2.0, 2.0, residuals, pool(residuals), 0.02, 0.02)
+    policy = fitted_policy(BlobConfig(), SPACE, 2.0, 2.0, residuals, pool(residuals), 1e-4, 0.05)
     seen = np.zeros((2, len(NAMES)))
     seen[:, FOUND] = 0.9, 0.3
     good, bad = (dict(zip([p.name for p in policy.space], policy.residual(one), strict=True)) for one in seen)
-    assert good["position_noise"] < -0.2
-    assert bad["position_noise"] > 0.2
-    assert good["size_noise"] < -0.15
-    assert bad["size_noise"] < -0.15
+    assert good["position_noise"] == pytest.approx(-0.5, abs=0.1)
+    assert bad["position_noise"] == pytest.approx(0.5, abs=0.1)
+    assert good["size_noise"] == pytest.approx(-0.4, abs=0.1)
+    assert bad["size_noise"] == pytest.approx(-0.4, abs=0.1)
     assert abs(good.get("gate", 0.0)) < 0.1
     assert abs(bad.get("gate", 0.0)) < 0.1
     assert all("time" not in row for row in policy.weights.values())
@@ -54,19 +54,18 @@ def test_it_finds_what_is_good_where() -> None:
 def test_where_nothing_matters_nothing_changes() -> None:
     residuals = drawn_residuals(SPACE, 12, np.random.default_rng(1))
     same = [[Played(one.seen, np.full(len(one.score), 0.7), 0.7) for one in row] for row in pool(residuals)]
-    assert fitted_policy(BlobConfig(), SPACE, 2.0, 2.0, residuals, same, 0.02, 0.02).weights == {}
+    assert fitted_policy(BlobConfig(), SPACE, 2.0, 2.0, residuals, same, 1e-4, 0.05).weights == {}
 
 
 def test_residuals_begin_with_none_and_stay_in_range() -> None:
     found = drawn_residuals(SPACE, 500, np.random.default_rng(0))
     assert not found[0].any()
     assert np.abs(found).max() <= 1
-    assert 0.2 < (found[1:] != 0).mean() < 0.5
+    assert 0.2 < (found[1:] != 0).mean() < 0.4
     assert np.array_equal(found, drawn_residuals(SPACE, 500, np.random.default_rng(0)))
 
 
-def test_constants_and_averages() -> None:
+def test_constants() -> None:
     base = BlobConfig(gate=0.9)
     assert constant(base, SPACE, np.zeros(3)) == base
     assert encode(SPACE, constant(base, SPACE, np.array([1.0, -1.0, 1.0]))) == pytest.approx([1, -1, 1])
-    assert smoothed(np.array([[0.0, 3.0, 0.0, 6.0]])).tolist() == [[1.0, 1.0, 3.0, 4.0]]
