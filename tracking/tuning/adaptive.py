@@ -29,7 +29,11 @@ from tracking.running.signals import NAMES
 
 SPREAD, CHANGED = 0.4, 0.35  # standard deviation of drawn residuals; share of the parameters that each changes
 LEAST_SD = 1e-3  # of a statistic: one that varies less tells nothing
-UNTOLD = "time", "since", "rate"  # statistics that do not depend on what is seen: they would be learned by heart
+# statistics of how tracker and detector fit; those of the crowd, and scores, mean something else in other scenes
+TOLD = (
+    "observed", "associated", "extra", "found", "coasting", "gap", "residual", "nis", "shift", "births", "deaths",
+    "brief",
+)  # fmt: skip
 LEAST_WEIGHT = 0.005  # of a standardised statistic: smaller ones are left out of the policy
 
 
@@ -80,7 +84,7 @@ def fitted_policy(
     )  # (C, N, K)
     score = np.concatenate([[one.score for one in scene] for scene in zip(*played, strict=True)], axis=1)  # (C, N)
     mean, sd = seen.mean(axis=(0, 1)), seen.std(axis=(0, 1))
-    tells = np.flatnonzero((sd > LEAST_SD) & ~np.isin(NAMES, UNTOLD))
+    tells = np.flatnonzero((sd > LEAST_SD) & np.isin(NAMES, TOLD))
     z = np.concatenate([np.ones((*score.shape, 1)), (seen[..., tells] - mean[tells]) / sd[tells]], axis=2)
     u, parts = residuals[:, None], z.shape[2]
     linear = (u[..., :, None] * z[..., None, :]).reshape(*score.shape, -1)
