@@ -39,10 +39,12 @@ def option(help: str, default: Any = MISSING, **more: Any) -> Any:
 
 def check_ranges(options: Any) -> None:
     """Raises InputError for the first option of an options dataclass that is less than `low`, or not less than `below`.
-    Options without `low` are not checked, and `high` is not checked here."""
+    Options without `low`, and absent ones, are not checked, and `high` is not checked here."""
     for f in fields(options):
         low, below, value = f.metadata["low"], f.metadata["below"], getattr(options, f.name)
-        if low is None or (value >= low and (below is None or value < below)):
+        if low is None or (value is None and f.default is None):
+            continue
+        if value is not None and (value >= low and (below is None or value < below)):
             continue
         expected = f"{low:g} or more" if below is None else f"a number from {low:g} to under {below:g}"
         raise InputError(place=f"--{f.name}", got=value, expected=expected, remedy="correct it")
