@@ -40,11 +40,19 @@ from tracking.parameter_space import space_of
 from tracking.running.policy import Policy
 from tracking.running.signals import NAMES
 from tracking.running.tracker_registry import config_class, find
-from tracking.tuning.adaptive import Played, drawn_residuals, fitted_policy, play_policy
-from tracking.tuning.adaptive_search import EVERY, FITS, MEMORY
+from tracking.tuning.adaptive import (
+    EVERY,
+    MEMORY,
+    Played,
+    drawn_residuals,
+    mean_objective,
+    play_policy,
+    searched_policy,
+)
 
 TRACKERS = "blob", "group-pda"
 SUITES = "drift", "drift-other", "standard"
+LIMIT, SEED = 0.4, 0  # of the rule; of the search
 SCENES = 2**31  # bytes of scenes that are kept
 # the parameters that are searched: those of detections, motion and existence
 SEARCHED = {
@@ -157,17 +165,16 @@ def adaptation(tracker: str, configs: int, train: range, seeds: range, out: Path
     """Prints the tables of one tracker."""
     bench = Bench(tracker)
     training = playable(bench, scenes("drift", train))
-    residuals = drawn_residuals(bench.space, configs, np.random.default_rng(0))
-    pool = [[bench.play(scene, bench.still, one) for scene in training] for one in residuals]
-    best = int(np.argmax([np.mean([one.objective for one in each]) for each in pool]))
-    policies = [fitted_policy(bench.base, bench.space, EVERY, MEMORY, residuals, pool, *fit) for fit in FITS]
-    gained = [np.mean([bench.play(scene, one).objective for scene in training]) for one in policies]
-    policy = policies[int(np.argmax(gained))]
+    residuals = drawn_residuals(bench.space, configs, np.random.default_rng(SEED))
+
+    def play(policy: Policy, offset: Array) -> list[Played]:
+        return [bench.play(scene, policy, offset) for scene in training]
+
+    policy, pool = searched_policy(play, bench.base, bench.space, configs, SEED, lambda text: None)
+    best = int(np.argmax([mean_objective(each) for each in pool]))
     parts = best_by_part(training, pool)
-    rule = Policy(bench.base, EVERY, MEMORY, RULES[tracker])
-    print(
-        f"\n{tracker}: {configs} configs, {len(training)} training scenes; policies in training", *np.round(gained, 3)
-    )
+    rule = Policy(bench.base, EVERY, MEMORY, RULES[tracker], LIMIT)
+    print(f"\n{tracker}: {configs} configs, {len(training)} training scenes", flush=True)
     print(policy.to_toml())
     for suite in SUITES:
         test = playable(bench, scenes(suite, seeds))

@@ -1,15 +1,16 @@
 """A policy: parameters of a tracker that follow what it sees of its input, without any truth (ours).
 
-Every `every` s each parameter p takes the residual a_p = clip(b_p + sum_s w_ps o_s, -1, 1) from the config it begins
-with (`parameter_space.moved`). o_s are the statistics of `tracking.running.signals` of the frames since the last
-decision, averaged over time: o <- o + (1 - exp(-every / memory)) (new - o). The first decision is before frame 1, where
-all statistics are 0; the first average is the first new value. The same numbers come from a live run.
+Every `every` s each parameter p takes the residual a_p = clip(b_p + sum_s w_ps o_s, -limit, limit) from the config that
+it begins with (`parameter_space.moved`). o_s are the statistics of `tracking.running.signals` of the frames since the
+last decision, averaged over time: o <- o + (1 - exp(-every / memory)) (new - o). The first decision is before frame 1,
+where all statistics are 0; the first average is the first new value. The same numbers come from a live run.
 
 A policy is a TOML file that can be read and edited:
 
     tracker = "blob"
     every = 1.0
     memory = 3.0
+    limit = 0.4
 
     [params]               # the config it begins with
     position_noise = 0.12
@@ -47,12 +48,14 @@ class Policy:
 
     base: the config that it begins with. every: s between two decisions. memory: s over which statistics are averaged;
     0: they are not. weights: by parameter a weight by name of a statistic, and "bias"; those that are absent are 0.
+    limit: of a residual.
     """
 
     base: Config
     every: float
     memory: float
     weights: Mapping[str, Mapping[str, float]]
+    limit: float = 1.0
 
     def __post_init__(self) -> None:
         kind = type(self.base)
@@ -60,6 +63,9 @@ class Policy:
             if not is_number(value, low, 3600.0):
                 expected = f"seconds from {low:g} to 3600"
                 raise InputError(place=place, got=repr(value), expected=expected, remedy="correct it")
+        if not is_number(self.limit, 0.0, 1.0):
+            expected = "a number from 0 to 1"
+            raise InputError(place="limit", got=repr(self.limit), expected=expected, remedy="correct it")
         for name, row in self.weights.items():
             if not kind.known(name).online:
                 expected, remedy = "a parameter that may change between frames", "remove it"
@@ -83,7 +89,7 @@ class Policy:
         matrix = np.array([[row.get(name, 0.0) for name in NAMES] for row in rows]).reshape(len(rows), len(NAMES))
         # as a sum along rows, whose order does not depend on the processor as that of a matrix product may
         found = (matrix * seen[None]).cumsum(axis=1)[:, -1] + [row.get(BIAS, 0.0) for row in rows]
-        return np.asarray(np.clip(found, -1.0, 1.0))
+        return np.asarray(np.clip(found, -self.limit, self.limit))
 
     def config(self, seen: Array) -> Config:
         """Returns the config, given the averaged statistics (K,)."""
@@ -91,13 +97,22 @@ class Policy:
 
     def as_dict(self) -> dict[str, Any]:
         """Returns what run.json says of it."""
-        return {"every": self.every, "memory": self.memory, "weights": {k: dict(v) for k, v in self.weights.items()}}
+        weights = {name: dict(row) for name, row in self.weights.items()}
+        return {"every": self.every, "memory": self.memory, "limit": self.limit, "weights": weights}
 
     def to_toml(self) -> str:
         """Returns the text of a file from which `read_policy` reads an equal policy."""
-        head = [f"tracker = {toml_value(self.base.tracker)}", f"every = {self.every}", f"memory = {self.memory}", ""]
+        head = [
+            f"tracker = {toml_value(self.base.tracker)}",
+            f"every = {self.every}",
+            f"memory = {self.memory}",
+            f"limit = {self.limit}",
+            "",
+        ]
         lines = [*head, "[params]", *(f"{name} = {toml_value(value)}" for name, value in self.base.as_dict().items())]
         for name, row in self.weights.items():
+            if not row:
+                continue
             lines += ["", f"[policy.{name}]", *(f"{signal} = {weight}" for signal, weight in row.items())]
         return "\n".join([*lines, ""])
 
@@ -109,16 +124,19 @@ def read_policy(kind: type[Config], path: str | Path) -> Policy | None:
     if "policy" not in content:
         return None
     name, rows = content.pop("tracker", kind.tracker), content.pop("policy")
-    every, memory, values = content.pop("every", 1.0), content.pop("memory", 0.0), content.pop("params", {})
+    every, memory, limit = content.pop("every", 1.0), content.pop("memory", 0.0), content.pop("limit", 1.0)
+    values = content.pop("params", {})
     if name != kind.tracker:
         remedy = "give the file to the tracker it was made for"
         raise InputError(file=path, place="tracker", got=repr(name), expected=kind.tracker, remedy=remedy)
     tables = (values, rows, *(rows.values() if isinstance(rows, dict) else ()))
     if content or not all(isinstance(table, dict) for table in tables):
         got, remedy = ", ".join(content) or "policy", "see tracking/running/policy.py"
-        raise InputError(file=path, got=got, expected="tracker, every, memory, [params], [policy.…]", remedy=remedy)
+        raise InputError(
+            file=path, got=got, expected="tracker, every, memory, limit, [params], [policy.…]", remedy=remedy
+        )
     try:
-        return Policy(kind.from_dict(values, path), every, memory, rows)
+        return Policy(kind.from_dict(values, path), every, memory, rows, limit)
     except InputError as error:
         raise (error if error.file else error.replaced(file=path)) from None
 

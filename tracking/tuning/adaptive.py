@@ -8,14 +8,15 @@ seen (standardised, z_0 = 1), is taken as a response surface (Box and Wilson 195
 
 S_w, what the window itself gives, is the mean over configs and falls out of the differences from it. g and h follow by
 ridge regression over all windows, scenes and configs. The surface is highest at u_p = sum_k g_pk z_k / (2 h_p), which
-is the policy. h_p is at least `curvature`, so that a parameter without effect stays. So no scene need tell when or how
+is the policy. h_p is at least `curvature`, so that a parameter without effect stays, and |u_p| at most `limit`, as the
+surface is known only where configs were drawn. So no scene need tell when or how
 it changes.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +29,8 @@ from tracking.running.policy import BIAS, Policy, averaged
 from tracking.running.signals import NAMES
 
 SPREAD, CHANGED = 0.4, 0.35  # standard deviation of drawn residuals; share of the parameters that each changes
+EVERY, MEMORY = 2.0, 2.0  # s from one decision to the next, and over which statistics are averaged
+FITS = tuple((1e-4, curvature, limit) for curvature in (0.2, 0.6) for limit in (0.3, 0.5))  # of `fitted_policy`
 LEAST_SD = 1e-3  # of a statistic: one that varies less tells nothing
 # statistics of how tracker and detector fit; those of the crowd, and scores, mean something else in other scenes
 TOLD = (
@@ -39,12 +42,17 @@ LEAST_WEIGHT = 0.005  # of a standardised statistic: smaller ones are left out o
 
 @dataclass(frozen=True)
 class Played:
-    """One episode with decisions: seen (T + 1, K), averaged statistics before each window, and after the last; score
-    (T,) of each window; objective of the whole episode."""
+    """One episode with T decisions: seen (T + 1, K), averaged statistics before each window, and after the last;
+    residual (T, P) and score (T,) of each window; objective of the whole episode."""
 
     seen: Array
+    residual: Array
     score: Array
     objective: float
+
+
+# play(policy, offset): plays all training scenes, in their order
+PlayAll = Callable[[Policy, Array], list[Played]]
 
 
 def play_policy(env: TuningEnv, policy: Policy, offset: Array | None = None) -> Played:
@@ -53,18 +61,19 @@ def play_policy(env: TuningEnv, policy: Policy, offset: Array | None = None) -> 
     The environment's next scene is played. Its parameters must begin with the policy's, and it must decide as often.
     """
     new, _ = env.reset(options={"params": policy.base})
-    names = [p.name for p in policy.space]
-    columns = [k for k, p in enumerate(env.space) if p.name in names]
-    seen, scores, ended = [averaged(None, new[: len(NAMES)].astype(float), policy)], list[float](), False
+    columns = [k for k, p in enumerate(env.space) if p.name in policy.weights]
+    seen, ended = [averaged(None, new[: len(NAMES)].astype(float), policy)], False
+    scores, moves = list[float](), list[Array]()
     while not ended:
         action = np.zeros(len(env.space))
-        action[columns] = policy.residual(seen[-1]) + (0.0 if offset is None else offset)
+        action[columns] = np.clip(policy.residual(seen[-1]) + (0.0 if offset is None else offset), -1.0, 1.0)
         before = 0 if env.rollout is None else len(env.rollout.tracks)
-        new, reward, ended, _, info = env.step(np.clip(action, -1.0, 1.0))
+        new, reward, ended, _, info = env.step(action)
+        moves.append(action[columns])
         assert env.rollout is not None
         scores.append(reward * env.rollout.length / (info["frame"] - before))
         seen.append(averaged(seen[-1], new[: len(NAMES)].astype(float), policy))
-    return Played(np.array(seen), np.array(scores), info["scores"].get("objective", math.nan))
+    return Played(np.array(seen), np.array(moves), np.array(scores), info["scores"].get("objective", math.nan))
 
 
 def drawn_residuals(space: Space, count: int, random: np.random.Generator) -> Array:
@@ -75,32 +84,65 @@ def drawn_residuals(space: Space, count: int, random: np.random.Generator) -> Ar
 
 
 def fitted_policy(
-    base: Config, space: Space, every: float, memory: float, residuals: Array, played: Sequence[Sequence[Played]],
-    ridge: float, curvature: float,
-) -> Policy:  # fmt: skip
-    """Returns the policy fitted to episodes: played[c][s] is that of config c, with residuals (C, P), on scene s."""
-    seen = np.concatenate(
-        [[one.seen[:-1] for one in scene] for scene in zip(*played, strict=True)], axis=1
-    )  # (C, N, K)
-    score = np.concatenate([[one.score for one in scene] for scene in zip(*played, strict=True)], axis=1)  # (C, N)
+    base: Config, space: Space, played: Sequence[Sequence[Played]], ridge: float, curvature: float, limit: float
+) -> Policy:
+    """Returns the policy fitted to episodes: played[c][s] is the c-th on scene s."""
+    scenes = list(zip(*played, strict=True))
+    seen = np.concatenate([[one.seen[:-1] for one in scene] for scene in scenes], axis=1)  # (C, windows, K)
+    score = np.concatenate([[one.score for one in scene] for scene in scenes], axis=1)  # (C, windows)
     mean, sd = seen.mean(axis=(0, 1)), seen.std(axis=(0, 1))
     tells = np.flatnonzero((sd > LEAST_SD) & np.isin(NAMES, TOLD))
     z = np.concatenate([np.ones((*score.shape, 1)), (seen[..., tells] - mean[tells]) / sd[tells]], axis=2)
-    u, parts = residuals[:, None], z.shape[2]
+    u = np.concatenate([[one.residual for one in scene] for scene in scenes], axis=1)  # (C, windows, P)
     linear = (u[..., :, None] * z[..., None, :]).reshape(*score.shape, -1)
-    surface = np.concatenate([linear, np.broadcast_to(-np.square(u), (*score.shape, len(space)))], axis=2)
+    surface = np.concatenate([linear, -np.square(u)], axis=2)
     x, y = (each - each.mean(axis=0) for each in (surface, score))
     x, y = x.reshape(-1, x.shape[2]), y.ravel()
     solved = np.linalg.solve(x.T @ x + ridge * len(x) * np.eye(x.shape[1]), x.T @ y)
-    slope, bend = solved[: -len(space)].reshape(len(space), parts), np.maximum(solved[-len(space) :], curvature)
+    slope, bend = solved[: -len(space)].reshape(len(space), -1), np.maximum(solved[-len(space) :], curvature)
     aim = slope / (2.0 * bend[:, None])
     rows = {}
     for p, (first, *others) in zip(space, aim.tolist(), strict=True):
         weights = {NAMES[k]: w / sd[k] for k, w in zip(tells, others, strict=True) if abs(w) > LEAST_WEIGHT}
         bias = first - sum(w * mean[NAMES.index(name)] for name, w in weights.items())
-        if weights or abs(first) > LEAST_WEIGHT:
-            rows[p.name] = {BIAS: round(float(bias), 4), **{name: round(float(w), 4) for name, w in weights.items()}}
-    return Policy(base, every, memory, rows)
+        told = weights or abs(first) > LEAST_WEIGHT
+        found = {BIAS: float(bias), **weights} if told else {}
+        rows[p.name] = {name: round(float(w), 4) for name, w in found.items()}
+    return Policy(base, EVERY, MEMORY, rows, limit)
+
+
+def searched_policy(
+    play: PlayAll, base: Config, space: Space, configs: int, seed: int, report: Callable[[str], None]
+) -> tuple[Policy, list[list[Played]]]:
+    """Returns the policy whose episodes have the best mean objective, the one that always keeps `base` if none has a
+    better one, and the episodes of the constants.
+
+    configs: number of constants to play. Half as many again are played round the best policy that was fitted to them,
+    and all are fitted once more.
+    """
+    random = np.random.default_rng(seed)
+    best = Policy(base, EVERY, MEMORY, {p.name: {} for p in space})
+    pool = list[list[Played]]()
+    for k, offset in enumerate(drawn_residuals(space, configs, random)):
+        report(f"policy: configs, {k + 1} of {configs}")
+        pool.append(play(best, offset))
+    constants, most = list(pool), mean_objective(pool[0])
+    for again in (0, configs // 2):
+        report(f"policy: {again} configs round the best")
+        here = best
+        pool += [play(here, offset) for offset in drawn_residuals(space, again + 1, random)[1:]]
+        for fit in FITS:
+            report("policy: fits")
+            made = fitted_policy(base, space, pool, *fit)
+            pool.append(play(made, np.zeros(len(space))))
+            if mean_objective(pool[-1]) > most:
+                best, most = made, mean_objective(pool[-1])
+    return best, constants
+
+
+def mean_objective(played: Sequence[Played]) -> float:
+    """Returns the mean of the objectives that are known."""
+    return float(np.nanmean([one.objective for one in played]))
 
 
 def constant(base: Config, space: Space, residual: Array) -> Config:

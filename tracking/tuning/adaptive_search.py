@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, counted
 from sim.types import Array, DetectionMode
 from sim.workers.calls import RunItems
@@ -24,13 +22,9 @@ from tracking.episodes.tuned_tracker import TunedTracker
 from tracking.parameter_space import Space
 from tracking.running.policy import Policy
 from tracking.scoring.people import Similarity
-from tracking.tuning.adaptive import Played, drawn_residuals, fitted_policy, play_policy
+from tracking.tuning.adaptive import EVERY, MEMORY, Played, play_policy, searched_policy
 from tracking.tuning.candidates import Comparison, compare_episodes
 from tracking.tuning.search_plan import SearchPlan
-
-EVERY, MEMORY = 2.0, 2.0  # s from one decision to the next, and over which statistics are averaged
-FEWEST = 6  # configs of which a policy can be fitted
-FITS = tuple((ridge, curvature) for ridge in (1e-4, 1e-3) for curvature in (0.05, 0.2))  # of `fitted_policy`
 
 
 @dataclass(frozen=True)
@@ -40,7 +34,7 @@ class WindowsTask:
     tracker: TunedTracker
     source: Source
     policy: Policy
-    offset: Array
+    offset: Array | None
     detections: DetectionMode
     similarity: Similarity | None
 
@@ -92,30 +86,22 @@ def adapted(plan: SearchPlan, config: Config, configs: int, report: Callable[[st
     """Returns a policy that begins with `config`, if it is surely better on the validation scenes. configs: number of
     constant configs to play, of which it is learned."""
     space = online_space(plan)
-    still = Policy(config, EVERY, MEMORY, {p.name: {} for p in space})
-    residuals = drawn_residuals(space, configs, np.random.default_rng(plan.options.seed))
     with playing_workers(plan.options.workers, plan.options.cluster) as run:
-        pool = list[list[Played | None]]()
-        for k, offset in enumerate(residuals):
-            report(f"policy: configs, {k + 1} of {configs}")
-            pool.append(_windows(run, plan, still, offset))
-        known = [s for s in range(len(plan.training)) if all(row[s] is not None for row in pool)]
+        first = _windows(run, plan, plan.training, still(config), None)
+        known = [source for source, one in zip(plan.training, first, strict=True) if one is not None]
         if not known:
             return Adapted(None, (), "the constant stays: no training scene can be played")
-        played = [[one for s in known if (one := row[s]) is not None] for row in pool]
-        best, most = still, float(np.nanmean([one.objective for one in played[0]]))
-        for k, fit in enumerate(FITS):
-            report(f"policy: fits, {k + 1} of {len(FITS)}")
-            made = fitted_policy(config, space, EVERY, MEMORY, residuals, played, *fit)
-            again = [one.objective for one in _windows(run, plan, made, np.zeros(len(made.space))) if one is not None]
-            if np.nanmean(again) > most:
-                best, most = made, float(np.nanmean(again))
-        if best is still:
+
+        def play(policy: Policy, offset: Array) -> list[Played]:
+            return [one for one in _windows(run, plan, known, policy, offset) if one is not None]
+
+        best, _ = searched_policy(play, config, space, configs, plan.options.seed, report)
+        if not any(best.weights.values()):
             return Adapted(None, (), "the constant stays: no policy is better in training")
         report("policy: validation")
         goal, comparisons = plan.goals[0], list[Comparison]()
         for name, sources in {"validation": plan.validation, **plan.tests}.items():
-            before, after = (list(_episodes(run, plan, sources, one)) for one in (still, best))
+            before, after = (list(_episodes(run, plan, sources, one)) for one in (still(config), best))
             found = compare_episodes(name, goal, before, after)
             comparisons += [] if found is None else [found]
             if name == "validation" and (found is None or found.verdict != "better"):
@@ -124,11 +110,18 @@ def adapted(plan: SearchPlan, config: Config, configs: int, report: Callable[[st
     return Adapted(best, tuple(comparisons), "the policy is kept: surely better than the constant in validation")
 
 
-def _windows(run: RunItems, plan: SearchPlan, policy: Policy, offset: Array) -> list[Played | None]:
+def still(config: Config) -> Policy:
+    """Returns the policy that keeps a config."""
+    return Policy(config, EVERY, MEMORY, {})
+
+
+def _windows(
+    run: RunItems, plan: SearchPlan, sources: Sequence[Source], policy: Policy, offset: Array | None
+) -> list[Played | None]:
     from sim.workers.start import results_in_order
 
     given = (policy, offset, plan.detections, plan.options.similarity)
-    tasks = [WindowsTask(plan.tracker, source, *given) for source in plan.training]
+    tasks = [WindowsTask(plan.tracker, source, *given) for source in sources]
     found = list[Played | None]()
     for result in results_in_order(run, play_windows, tasks, _lost):
         if isinstance(result, FlockscopeError):

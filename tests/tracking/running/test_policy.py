@@ -87,7 +87,7 @@ def test_wrong_files_are_named(tmp_path: Path, line: str, words: str, place: str
 def test_a_run_live_and_the_environment_do_the_same(sequence: Sequence, tmp_path: Path) -> None:
     (tmp_path / "p.toml").write_text(POLICY.to_toml())
     run = tracking.track("blob", sequence, params=tmp_path / "p.toml", detections="file")
-    assert run.info["policy"] == {"every": 0.6, "memory": 1.0, "weights": WEIGHTS}
+    assert run.info["policy"] == {"every": 0.6, "memory": 1.0, "limit": 1.0, "weights": WEIGHTS}
     live = tracking.Live("blob", fps=5, camera=sequence.camera, params=POLICY, image_size=sequence.image_size)
     reported = []
     for frame in sequence:

@@ -31,14 +31,16 @@ def pool(residuals: np.ndarray, scenes: int = 6, windows: int = 40) -> list[list
             seen[:, TIME] = np.linspace(0, 1, windows + 1)
             want = np.where(bad[1:], 0.5, -0.5)
             score = 0.8 - 0.3 * (one[high] - want) ** 2 - 0.3 * (one[low] + 0.4) ** 2
-            row.append(Played(seen, score + random.normal(0, 0.02, windows), float(score.mean())))
+            row.append(
+                Played(seen, np.tile(one, (windows, 1)), score + random.normal(0, 0.02, windows), float(score.mean()))
+            )
         made.append(row)
     return made
 
 
 def test_it_finds_what_is_good_where() -> None:
     residuals = drawn_residuals(SPACE, 40, np.random.default_rng(1))
-    policy = fitted_policy(BlobConfig(), SPACE, 2.0, 2.0, residuals, pool(residuals), 1e-4, 0.05)
+    policy = fitted_policy(BlobConfig(), SPACE, pool(residuals), 1e-4, 0.05, 0.9)
     seen = np.zeros((2, len(NAMES)))
     seen[:, FOUND] = 0.9, 0.3
     good, bad = (dict(zip([p.name for p in policy.space], policy.residual(one), strict=True)) for one in seen)
@@ -53,8 +55,10 @@ def test_it_finds_what_is_good_where() -> None:
 
 def test_where_nothing_matters_nothing_changes() -> None:
     residuals = drawn_residuals(SPACE, 12, np.random.default_rng(1))
-    same = [[Played(one.seen, np.full(len(one.score), 0.7), 0.7) for one in row] for row in pool(residuals)]
-    assert fitted_policy(BlobConfig(), SPACE, 2.0, 2.0, residuals, same, 1e-4, 0.05).weights == {}
+    same = [
+        [Played(one.seen, one.residual, np.full(len(one.score), 0.7), 0.7) for one in row] for row in pool(residuals)
+    ]
+    assert not any(fitted_policy(BlobConfig(), SPACE, same, 1e-4, 0.05, 0.9).weights.values())
 
 
 def test_residuals_begin_with_none_and_stay_in_range() -> None:

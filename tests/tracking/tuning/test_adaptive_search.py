@@ -8,8 +8,10 @@ import pytest
 
 from scenarios.errors import InputError
 from tests.tuning_toys import toy_plan, tune_arguments
+from tracking.config import Config
+from tracking.parameter_space import Space
 from tracking.running.policy import Policy, read_policy
-from tracking.tuning import adaptive_search
+from tracking.tuning import adaptive
 from tracking.tuning.adaptive_search import adapted
 from tracking.tuning.search import tune
 
@@ -29,17 +31,21 @@ def test_where_nothing_changes_the_constant_stays(tmp_path: Path) -> None:
 
 def test_a_policy_that_surely_helps_is_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The defaults of the toy are bad: a policy that only lengthens its reach helps in every scene."""
-    monkeypatch.setattr(adaptive_search, "FITS", ((0.02, 0.02),))
-    monkeypatch.setattr(
-        adaptive_search, "fitted_policy", lambda base, *_: Policy(base, 2.0, 2.0, {"reach": {"bias": 0.5}})
-    )
+    monkeypatch.setattr(adaptive, "FITS", ((1e-4, 0.2, 0.5),))
+
+    def longer(base: Config, space: Space, *_: object) -> Policy:
+        return Policy(base, 2.0, 2.0, {p.name: {"bias": 0.5} if p.name == "reach" else {} for p in space})
+
+    monkeypatch.setattr(adaptive, "fitted_policy", longer)
     plan = toy_plan(tmp_path, objective=(), adaptive=6)
     found = adapted(plan, plan.base, 6, quiet)
     assert found.policy is not None
     assert [c.scenes for c in found.comparisons] == ["validation", "one.toml", "two.toml"]
     assert all(c.verdict == "better" for c in found.comparisons)
     (tmp_path / "p.toml").write_text(found.policy.to_toml())
-    assert read_policy(type(plan.base), tmp_path / "p.toml") == found.policy
+    again = read_policy(type(plan.base), tmp_path / "p.toml")
+    assert again is not None
+    assert again.as_dict()["weights"] == {"reach": {"bias": 0.5}}
 
 
 def test_what_cannot_be_adapted_is_said_before_anything_is_played(tmp_path: Path) -> None:
