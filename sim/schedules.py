@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,9 +20,10 @@ def values_at(value: float | Schedule, t: Array) -> Array:
     if isinstance(value, (int, float)):
         return np.full(len(t), float(value))
     found = np.full(len(t), float(value.value[0]))
-    for k, at in enumerate(value.at[1:], 1):
+    for at, (before, after) in zip(value.at[1:], pairwise(value.value), strict=True):
         share = np.clip((t - at) / value.ramp, 0.0, 1.0) if value.ramp else (t >= at).astype(float)
-        found += share * (value.value[k] - value.value[k - 1])
+        # a sum of changes would miss the last value by its rounding, and could fall below 0
+        found = np.where(t >= at, np.where(share < 1.0, before + share * (after - before), after), found)
     return found
 
 

@@ -18,7 +18,7 @@ from tests.processes import FAKE, TOY, python
 from tests.toy_tracker import Toy
 from tracking.config import Config, param
 from tracking.environment.env import TuningEnv
-from tracking.environment.observation import NAMES
+from tracking.running.signals import NAMES
 from tracking.parameter_space import encode
 from tracking.running.tracker_registry import names
 
