@@ -126,9 +126,7 @@ def test_noise_follows() -> None:
     noisy = sense(truth, perfect(noise_m=table([0, 20], [0.0, 0.2])), 1)
     assert spread(noisy, exact, "pos") == pytest.approx([0, 0.2], rel=0.05)
     across = {"across": (0, 0.05), "width": (0, 0), "foot": (0, 0), "top": (0, 0), "floor_px": 0}
-    one, changed = (
-        sense(truth, perfect(box_noise={**across, "scale": s}), 1) for s in (1.0, table([0, 20], [0.5, 3]))
-    )
+    one, changed = (sense(truth, perfect(box_noise={**across, "scale": s}), 1) for s in (1.0, table([0, 20], [0.5, 3])))
     plain = spread(one, exact, "box")
     assert spread(changed, exact, "box") == pytest.approx([0.5 * plain[0], 3 * plain[1]])
 

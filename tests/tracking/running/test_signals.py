@@ -13,14 +13,27 @@ from tracking.running.signals import NAMES, STATISTICS, Signals
 FPS = 10.0
 
 
-def tracks(index: int, places: Any, vel: Any = (1.0, 0.0), ids: Any = None, plane: Any = "ground", **more: Any) -> Tracks:
+def tracks(
+    index: int, places: Any, vel: Any = (1.0, 0.0), ids: Any = None, plane: Any = "ground", **more: Any
+) -> Tracks:
     """People at places (N, 2); the variance of the prediction of a frame later is 0.05 along each axis."""
     pos = np.array(places, float).reshape(-1, 2)
     n = len(pos)
     id = np.arange(n) if ids is None else np.array(ids, np.int64)
     group = np.array(more.pop("group", np.full(n, -1)), np.int64)
     cov = np.tile(np.diag([0.04, 0.04, 1.0, 1.0]), (n, 1, 1)) if "cov" not in more else more.pop("cov")
-    return Tracks(index, (index - 1) / FPS, plane, "person", id, group, pos, np.broadcast_to(np.array(vel, float), (n, 2)), cov, **more)
+    return Tracks(
+        index,
+        (index - 1) / FPS,
+        plane,
+        "person",
+        id,
+        group,
+        pos,
+        np.broadcast_to(np.array(vel, float), (n, 2)),
+        cov,
+        **more,
+    )
 
 
 def frame(index: int, places: Any = (), score: Any = None, plane: Any = "ground", box: Any = None) -> Frame:
@@ -236,7 +249,9 @@ def test_bounds_and_kind(plane: Any) -> None:
         cov = rng.choice([0.0, 1e-12, 1.0, np.nan]) * np.tile(np.eye(4), (n, 1, 1))
         tall = rng.choice([0.0, 1.0, 90.0, np.nan])
         label = rng.integers(-1, 3, n)
-        answer = tracks(k, at, vel, ids=ids, plane=plane, group=label, cov=cov, box=boxes(at, tall), seen=rng.random(n) < 0.5)
+        answer = tracks(
+            k, at, vel, ids=ids, plane=plane, group=label, cov=cov, box=boxes(at, tall), seen=rng.random(n) < 0.5
+        )
         found = rng.normal(0, rng.choice([5.0, 1e9]), (m, 2))
         one = frame(k, found, rng.uniform(0, 1, m), rng.choice(["ground", "image"]), boxes(found))
         signals.add(one if rng.random() < 0.9 else Frame(k, (k - 1) / FPS), answer)
