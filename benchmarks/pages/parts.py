@@ -67,7 +67,7 @@ def _keys(table: dict[str, Any], known: dict[str, Any], prefix: str) -> Iterator
 
 def _tables(node: dict[str, Any], known: dict[str, Any]) -> Iterator[dict[str, Any]]:
     ref = node.get("$ref", "").rpartition("/")[2]
-    if ref and ref != "Distribution":
+    if ref and ref not in ("Distribution", "Schedule"):
         yield known[ref]
     for inner in [node.get("items", {}), *node.get("anyOf", ()), *node.get("oneOf", ())]:
         if inner:

@@ -7,6 +7,7 @@ from collections import Counter
 from scenarios.loading.toml_files import toml_value
 from scenarios.schema.groups import GroupSpec, Stop
 from scenarios.schema.scenario import MergeOrder, Scenario, ScriptOrder, SplitOrder, When
+from scenarios.schema.schedule import Schedule
 from scenarios.schema.values import Distribution, Point, Value
 
 AT_GOAL = {"stand": "stand there", "leave": "leave", "walk": "walk on"}
@@ -29,6 +30,15 @@ def number(value: Value, unit: str = "") -> str:
         return " or ".join(f"{v:g}{share}" for v, share in shares.items()) + tail
     mean = value.exponential if value.exponential is not None else value.poisson
     return f"about {mean:g}{tail}{clip}"
+
+
+def changing(value: float | Schedule, form: str = "g") -> str:
+    """Returns a value that may change in words: `0.3`, `0.3 (from 20 s 1.5, from 40 s 0.3, each within 5 s)`."""
+    if not isinstance(value, Schedule):
+        return format(value, form)
+    later = [f"from {at:g} s {v:{form}}" for at, v in zip(value.at[1:], value.value[1:], strict=True)]
+    later += [f"each within {value.ramp:g} s"] * (value.ramp > 0)
+    return f"{value.value[0]:{form}} ({', '.join(later)})"
 
 
 def place(point: Point) -> str:
@@ -123,9 +133,9 @@ def sensor(scenario: Scenario) -> list[str]:
     """Returns lines of text about the sensor: its rates, each other key that differs from the default, `hide`."""
     s = scenario.sensor
     changed = s.model_dump(exclude_defaults=True, exclude={"detect_prob", "clutter_rate", "hide"})
-    rate = f"{s.clutter_rate:g} false alarms per frame"
+    rate = f"{changing(s.clutter_rate)} false alarms per frame"
     lines = [
-        f"detects {s.detect_prob:.0%} of fully visible people, {rate}",
+        f"detects {changing(s.detect_prob, '.0%')} of fully visible people, {rate}",
         *(f"{k} = {toml_value(v)}" for k, v in changed.items()),
     ]
     return lines + [f"hides {h.group or 'everybody'} from {h.start:g} to {h.end:g} s" for h in s.hide]

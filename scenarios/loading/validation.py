@@ -13,13 +13,8 @@ from scenarios.errors import InputError, counted
 from scenarios.limits import COORDINATE, is_number
 from scenarios.loading.toml_files import KeyPath, Table, did_you_mean, place_of
 
-TAGS = {
-    "number",
-    "distribution",
-    "point",
-    "meet",
-    "schedule",
-}  # of the discriminators of values, in pydantic's locations
+# of the discriminators of values, in pydantic's locations
+TAGS = {"number", "distribution", "schedule", "point", "meet"}
 # What is expected, by the type of pydantic's error and its context.
 EXPECTED = {
     "bool_type": "true or false", "int_type": "an integer", "float_type": "a number", "string_type": "a text",

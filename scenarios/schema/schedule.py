@@ -7,17 +7,15 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import Annotated, Any, Generic, Self, TypeVar
+from typing import Annotated, Any, Self
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from scenarios.limits import DETECTIONS
-from scenarios.schema.values import Model, NonNegative, Share, problem, within
-
-N = TypeVar("N")
+from scenarios.schema.values import Distribution, Model, NonNegative, problem, within
 
 
-class Schedule(Model, Generic[N]):
+class Schedule(Model):
     """A value that changes at given times.
 
     Attributes:
@@ -27,7 +25,7 @@ class Schedule(Model, Generic[N]):
     """
 
     at: Annotated[tuple[NonNegative, ...], Field(min_length=2)]
-    value: tuple[N, ...]
+    value: tuple[float, ...]
     ramp: NonNegative = 0.0
 
     @model_validator(mode="after")
@@ -42,19 +40,30 @@ class Schedule(Model, Generic[N]):
 
 
 def _kind(value: Any) -> str:
-    table = isinstance(value, dict) and bool(value.keys() & {"at", "value", "ramp"})
+    """Returns "schedule" also for a table whose keys are misspelt, so that the message names them."""
+    table = isinstance(value, dict) and bool(value) and not value.keys() & {*Distribution.model_fields, "link"}
     return "schedule" if table or isinstance(value, Schedule) else "number"
 
 
-_EITHER = Discriminator(_kind)
-_Alarms = Annotated[float, within(0.0, DETECTIONS / 5, " false alarms per frame")]
-_Distance = Annotated[float, within(0.0, 1000.0, " m")]
-_Factor = Annotated[float, within(0.0, 20.0)]
-_Frames = Annotated[float, within(1.0, 1000.0, " frames")]
-_Pixels = Annotated[float, within(0.0, 500.0, " px")]
-Shares = Annotated[Annotated[Share, Tag("number")] | Annotated[Schedule[Share], Tag("schedule")], _EITHER]
-Alarms = Annotated[Annotated[_Alarms, Tag("number")] | Annotated[Schedule[_Alarms], Tag("schedule")], _EITHER]
-Distances = Annotated[Annotated[_Distance, Tag("number")] | Annotated[Schedule[_Distance], Tag("schedule")], _EITHER]
-Factors = Annotated[Annotated[_Factor, Tag("number")] | Annotated[Schedule[_Factor], Tag("schedule")], _EITHER]
-FrameSteps = Annotated[Annotated[_Frames, Tag("number")] | Annotated[Schedule[_Frames], Tag("schedule")], _EITHER]
-Movements = Annotated[Annotated[_Pixels, Tag("number")] | Annotated[Schedule[_Pixels], Tag("schedule")], _EITHER]
+def each_within(low: float, high: float, unit: str = "") -> AfterValidator:
+    """Returns a validator that refuses a number outside `low` to `high`, or a schedule with one."""
+    number = within(low, high, unit).func
+
+    def check(value: float | Schedule) -> float | Schedule:
+        for one in value.value if isinstance(value, Schedule) else (value,):
+            number(one)  # type: ignore[call-arg]
+        return value
+
+    return AfterValidator(check)
+
+
+Changing = Annotated[
+    Annotated[float, Tag("number")] | Annotated[Schedule, Tag("schedule")],
+    Discriminator(_kind),
+]
+Shares = Annotated[Changing, each_within(0.0, 1.0)]
+Alarms = Annotated[Changing, each_within(0.0, DETECTIONS / 5, " false alarms per frame")]
+Distances = Annotated[Changing, each_within(0.0, 1000.0, " m")]
+Factors = Annotated[Changing, each_within(0.0, 20.0)]
+FrameSteps = Annotated[Changing, each_within(1.0, 1000.0, " frames")]
+Movements = Annotated[Changing, each_within(0.0, 500.0, " px")]

@@ -129,7 +129,7 @@ class Sensor(Model):
     Attributes:
         detect_prob: probability that a fully visible person of usual size is detected
         clutter_rate: mean number of false alarms per frame (Poisson)
-        every: frames from one look of the detector to the next; there are no detections in between
+        every: frames from one look of the detector to the next, without detections in between; absent: every frame
         box_noise: errors of boxes, in box heights
         noise_m: standard deviation of points on the ground along each axis, m
         box: visible: boxes of the visible parts, so that occlusion moves foot points; amodal: boxes of whole people
@@ -150,7 +150,7 @@ class Sensor(Model):
 
     detect_prob: Shares = 0.95
     clutter_rate: Alarms = 0.3
-    every: FrameSteps = 1.0
+    every: FrameSteps | None = None
     box_noise: BoxNoise = BoxNoise()
     noise_m: Distances = 0.05
     box: Literal["visible", "amodal"] = "visible"

@@ -75,7 +75,7 @@ def persistent_false_alarms(
 
 
 def _draw_births(
-    model: FalseAlarms, rate: float | Schedule[float], truth: Truth, seed: int, repeat: int
+    model: FalseAlarms, rate: float | Schedule, truth: Truth, seed: int, repeat: int
 ) -> Iterator[tuple[int, float, tuple[int, int], Array, Array]]:
     """Yields each alarm of a sequence that lives in a frame, in order of birth: first frame (from 1), age there, s, its
     name (tick of birth, and number among those born then), which names its random streams, and its uniforms.

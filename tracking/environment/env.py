@@ -135,9 +135,10 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
                 seed; "params" are the tracker's parameters to begin with.
 
         Returns:
-            The observation, and a dict with scenario, seed, frame (number of frames tracked), objective (0 while
-            unknown), scores (by key), names (the action's parameters), params (all values by name), and refused (the
-            tracker's message about the last action's config, "" if it was accepted).
+            The observation, and a dict with scenario, seed, frame (number of frames tracked), objective (of the frames
+            so far, 0 while unknown; with reward="window" it is 0 before the end), scores (by key), names (the action's
+            parameters), params (all values by name), and refused (the tracker's message about the last action's config,
+            "" if it was accepted).
 
         Raises:
             InputError: An option is unknown, no source fits, the source cannot be opened or has no labels, or the
@@ -207,10 +208,12 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
             before, self.score = self.score, self.scores.get("objective", 0.0)
             return self.score - before
         played = len(rollout.tracks) - first + 1
-        found = rollout.window_objective(first - round(self.margin * rollout.sequence.fps)) if played > 0 else 0.0
-        # nobody to track, and nobody tracked, is right
+        first = max(first - round(self.margin * rollout.sequence.fps), 1)
+        # HOTA is 0 where nobody is to be tracked, whatever is tracked
+        right = played == 0 or _is_empty(rollout, first)
+        found = 1.0 if right else rollout.window_objective(first)
         reward = (1.0 if math.isnan(found) else found) * played / rollout.length
-        self.score += reward
+        self.score = self.scores.get("objective", 0.0)
         return reward
 
     def _decided(self, action: Any, build: Any) -> Any:
@@ -269,10 +272,10 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
 
     def _draw_source(self, options: Mapping[str, Any]) -> Source:
         name, seed = options.get("scenario"), options.get("seed")
-        fitting = [s for s in self.sources if name in (None, s.name) and seed in (None, s.seed)]
+        fitting = [s for s in self.sources if name in (None, s.name, _scenario(s)) and seed in (None, s.seed)]
         fitting = [s for s in fitting if s not in self.left_out] or fitting
         if not fitting:
-            names, seeds = sorted({s.name for s in self.sources}), sorted({s.seed for s in self.sources})
+            names, seeds = sorted({_scenario(s) for s in self.sources}), sorted({s.seed for s in self.sources})
             expected = f"one of {', '.join(names)}, with a seed from {seeds[0]} to {seeds[-1]}"
             raise InputError(place="options", got=f"{name}, {seed}", expected=expected, remedy="correct the options")
         return fitting[int(self.np_random.integers(len(fitting)))]
@@ -285,7 +288,7 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
 
     def _info(self) -> dict[str, Any]:
         return {
-            "scenario": self.source.name,
+            "scenario": _scenario(self.source),
             "seed": self.source.seed,
             "frame": 0 if self.rollout is None else len(self.rollout.tracks),
             "objective": self.score,
@@ -294,6 +297,18 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
             "params": self.config.as_dict(),
             "refused": self.refused,
         }
+
+
+def _is_empty(rollout: Rollout, first: int) -> bool:
+    """Returns True if there are neither people nor tracks in the frames `first` to the last one played."""
+    truth, last = rollout.truth, len(rollout.tracks)
+    labelled = truth.rows(last).stop > truth.rows(first).start
+    return not labelled and not any(len(tracks.id) for tracks in rollout.tracks[first - 1 :])
+
+
+def _scenario(source: Source) -> str:
+    """Returns the name of a source without its seed, so that a stored sequence is named as a simulated one."""
+    return source.name if source.simulated else source.name.removesuffix(f"-s{source.seed:05d}")
 
 
 def _check_split(among: Iterable[Source]) -> None:

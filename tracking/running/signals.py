@@ -53,12 +53,12 @@ STATISTICS = (
     Statistic("residual", 0.1, "m or heights", "distance of a detection from its track's prediction, root mean square"),
     Statistic("nis", 1.0, "", "normalised innovation squared, median"),
     Statistic("shift", 0.1, "m or heights", "movement common to all tracks beside the prediction, root mean square"),
-    Statistic("births", 1.0, "1/s", "new tracks"),
-    Statistic("deaths", 1.0, "1/s", "tracks that ended"),
+    Statistic("births", 1.0, "per s", "new tracks"),
+    Statistic("deaths", 1.0, "per s", "tracks that ended"),
     Statistic("brief", None, "share", "ended tracks that were younger than 1 s"),
     Statistic("speed", 1.3, "m/s", "speed of the tracks, median"),
     Statistic("grouped", None, "share", "tracks in a group; of trackers of groups, groups of two people or more"),
-    Statistic("regrouped", 1.0, "1/s", "tracks whose group changes"),
+    Statistic("regrouped", 1.0, "per s", "tracks whose group changes"),
 )
 NAMES = tuple(s.name for s in STATISTICS)
 
@@ -75,7 +75,6 @@ class Signals:
         self._last: Tracks | None = None
         self._begun: dict[int, float] = {}
         self._found: dict[int, float] = {}
-        self._end = self._time = 0.0
         self._clear()
 
     def _clear(self) -> None:
@@ -93,7 +92,7 @@ class Signals:
             self._count.append(len(found.pos))
             self._scores.append(found.score if len(found.score) else np.ones(len(found.pos)))
         if found is not None and len(found.pos) and last is not None:
-            self._compare(found, last, 1.0 / self.fps)
+            self._compare(found, last, (frame.index - last.index) / self.fps, frame.t)
         now = frame.t
         here = {int(id) for id in tracks.id}
         for id in here - self._begun.keys():
@@ -109,10 +108,10 @@ class Signals:
         if last is not None:
             _, a, b = np.intersect1d(tracks.id, last.id, assume_unique=True, return_indices=True)
             self._moved += int(np.count_nonzero(tracks.group[a] != last.group[b]))
-        self._last, self._end = tracks, now
+        self._last = tracks
         self._tracks.append(tracks)
 
-    def _compare(self, found: Detections, last: Tracks, dt: float) -> None:
+    def _compare(self, found: Detections, last: Tracks, dt: float, now: float) -> None:
         places = _comparable(found, last, dt)
         if places is None:
             return
@@ -125,10 +124,10 @@ class Signals:
         self._have += len(row)
         for id in last.id[column].tolist():
             if id in self._found:
-                self._found[id] = found.t
+                self._found[id] = now
         self._residuals += np.square(far[row, column]).tolist()
-        nis = np.square(off[row, column]) / variance[column]
-        self._nis += nis[np.isfinite(nis).all(axis=1)].mean(axis=1).tolist()
+        known = (variance[column] > 0).all(axis=1)
+        self._nis += (np.square(off[row, column][known]) / variance[column][known]).mean(axis=1).tolist()
         if len(row) >= COMMON:
             common = np.median(off[row, column], axis=0)
             self._shifts.append(float(np.square(common).sum()))
@@ -141,7 +140,6 @@ class Signals:
         """
         values = self._values(px_per_m) if self._tracks else {}
         self._clear()
-        self._time = self._end
         return np.array([squashed(s, values.get(s.name, 0.0)) for s in STATISTICS], np.float32)
 
     def _values(self, px_per_m: float) -> dict[str, float]:

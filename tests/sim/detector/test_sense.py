@@ -88,11 +88,11 @@ def test_misses_are_as_frequent_as_asked(p: float) -> None:
 
 @pytest.mark.parametrize("rate", [0.3, 5.0, 60.0])
 def test_clutter_is_poisson(rate: float) -> None:
-    n = false_alarm_counts(rate, 20_000, seed=1)
+    n = false_alarm_counts(np.full(20_000, rate), seed=1)
     assert n.mean() == pytest.approx(rate, abs=4 * np.sqrt(rate / 20_000))
     assert n.var() == pytest.approx(rate, rel=0.06)
-    assert (false_alarm_counts(rate * 1.2, 20_000, seed=1) >= n).all()
-    assert (false_alarm_counts(0.0, 10, seed=1) == 0).all()
+    assert (false_alarm_counts(np.full(20_000, rate * 1.2), seed=1) >= n).all()
+    assert (false_alarm_counts(np.zeros(10), seed=1) == 0).all()
 
 
 def test_noise_has_the_sd_that_was_asked_for() -> None:
