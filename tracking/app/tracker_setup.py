@@ -9,6 +9,7 @@ from typing import Any
 from sim.types import DetectionMode, Sequence
 from tracking.config import Config
 from tracking.grouping.grouping_choice import Grouping
+from tracking.running.policy import Policy
 from tracking.running.run import TrackingRun
 from tracking.running.time_limit import TimeLimited
 
@@ -18,7 +19,7 @@ class TrackerSetup:
     """A tracker with its parameters and inputs, as `tracking.track` takes them."""
 
     tracker: str
-    config: Config | None = None
+    config: Config | Policy | None = None
     detections: DetectionMode | None = None
     sensor: Mapping[str, Any] = field(default_factory=dict)
     seed: int = 0

@@ -241,13 +241,19 @@ def prepare(
     )  # fmt: skip
 
 
+def params_in(kind: type[Config], source: str | Path) -> Config | Policy:
+    """Returns the config or the policy in a TOML file, or the preset of this name. Raises InputError as `Config.load`
+    and `read_policy` do."""
+    return read_policy(kind, file_of(kind.tracker, source)) or kind.load(source)
+
+
 def _policy(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> Policy | None:
     """Returns the policy that `params` are or that they name, None if they are parameters."""
     given = tracker.tracker if isinstance(tracker, TimeLimited) else tracker
-    if isinstance(params, Policy) or not isinstance(params, str | Path) or not isinstance(given, str | type):
-        return params if isinstance(params, Policy) else None
-    kind: type[Config] | None = getattr(tracker_registry.find(given), "config_class", None)
-    return None if kind is None else read_policy(kind, file_of(kind.tracker, params))
+    if isinstance(params, str | Path) and isinstance(given, str | type):
+        kind: type[Config] | None = getattr(tracker_registry.find(given), "config_class", None)
+        params = None if kind is None else params_in(kind, params)
+    return params if isinstance(params, Policy) else None
 
 
 def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> tuple[str, Tracker, Config | None]:

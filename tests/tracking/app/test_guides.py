@@ -24,22 +24,28 @@ BLOCK = re.compile(r"^```(\w*)\n(.*?)^```$", re.DOTALL | re.MULTILINE)
 SAVED = re.compile(r"Save this as `([^`]+)`")
 
 
-def play(text: str, data: bool, capsys: pytest.CaptureFixture[str], again: list[str] | None = None) -> list[str]:
+def play(
+    text: str, data: bool, capsys: pytest.CaptureFixture[str], again: list[str] | None = None,
+    scripts: list[str] | None = None,
+) -> list[str]:  # fmt: skip
     """Runs the blocks in order and returns the commands that ran. data: also those that read the folder `data`.
 
-    again: receives what stands in place of each text, which is then not compared.
+    again: receives what stands in place of each text, which is then not compared. scripts: receives what python prints.
 
     A block whose preceding text says "Save this as" becomes a file. Others: python is a script, text is what the last
-    command printed, to the letter but for lines that a line "…" stands for, sh is not run, and lines of a block without
+    command or script printed, to the letter but for lines that a line "…" stands for, sh is not run, and lines of a block without
     a language are commands.
     """
-    done, printed, end = [], "", 0
+    done, printed, end, scripts = [], "", 0, [] if scripts is None else scripts
     for block in BLOCK.finditer(text):
         kind, body, before, end = block[1], block[2], text[end : block.start()], block.end()
         if saved := SAVED.findall(before):
             Path(saved[-1]).write_text(body)
         elif kind == "python":
+            capsys.readouterr()
             exec(compile(body, "guide", "exec"), {})
+            printed = capsys.readouterr().out or printed
+            scripts.append(printed)
         elif kind == "text":
             shown = "\n".join(map(str.rstrip, printed.splitlines()))
             if again is None:
@@ -115,8 +121,10 @@ def test_who_belongs_together(tmp_path, monkeypatch, capsys):
 
 def test_live(tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
-    assert not play((GUIDES / "live.md").read_text(encoding="utf-8"), False, capsys), "its commands need cameras"
-    printed = capsys.readouterr().out
+    shown = list[str]()
+    text = (GUIDES / "live.md").read_text(encoding="utf-8")
+    assert not play(text, False, capsys, scripts=shown), "its commands need cameras"
+    printed = "".join(shown)
     assert " s: " in printed
     assert "[1, 2]" in printed
 
@@ -129,6 +137,11 @@ def test_live(tmp_path, monkeypatch, capsys):
 def test_without_recordings(name, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     follow(name, False, capsys)
+
+
+def test_train_an_agent(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    follow("train-an-agent", False, capsys)
 
 
 def test_train_on_it(tmp_path, monkeypatch, capsys):

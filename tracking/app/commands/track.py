@@ -30,6 +30,8 @@ from tracking.config import Config
 from tracking.grouping.grouping_choice import grouping_of
 from tracking.recordings.live_source import is_live
 from tracking.running.detection_mode import BOTH, choose_mode
+from tracking.running.policy import Policy
+from tracking.running.prepare import params_in
 from tracking.running.run import TrackingRun
 from tracking.running.run_info import input_summary
 from tracking.running.time_limit import TimeLimited
@@ -129,11 +131,13 @@ def _setup(options: TrackOptions) -> TrackerSetup:
     return TrackerSetup(options.tracker, config, options.detections, sensor, options.seed, rule, limited, options.mask)
 
 
-def _config(tracker: str, params: str | None, settings: list[str]) -> Config | None:
+def _config(tracker: str, params: str | None, settings: list[str]) -> Config | Policy | None:
     kind: type[Config] | None = getattr(find(tracker), "config_class", None)
     if kind is not None:
-        config = kind() if params is None else kind.load(params)
-        return config.with_set(*settings)
+        found = kind() if params is None else params_in(kind, params)
+        if isinstance(found, Policy):
+            return replace(found, base=found.base.with_set(*settings))
+        return found.with_set(*settings)
     if params is None and not settings:
         return None
     place, remedy = "--params" if params else f"--set {settings[0]}", "leave it out, or give the class a config_class"
