@@ -166,7 +166,7 @@ class TrackOptions(SceneOptions, BoxOptions, words="track"):
         metavar="SOURCE")
     out: Path = OUT()
     params: str | None = option(
-        "The tracker's parameters: a file, a policy's too, or a preset such as paper.", None, metavar="FILE.toml|PRESET")
+        "The tracker's parameters: a file, of a policy, too, or a preset: paper.", None, metavar="FILE.toml|PRESET")
     detections: DetectionsOrBoth = option(
         "Detections that the tracker gets. Default: the first of image, file, truth that can be; with --boxes both, if "
         "tracker and source can, else file.", None)

@@ -33,8 +33,8 @@ def play(
     again: receives what stands in place of each text, which is then not compared. scripts: receives what python prints.
 
     A block whose preceding text says "Save this as" becomes a file. Others: python is a script, text is what the last
-    command or script printed, to the letter but for lines that a line "…" stands for, sh is not run, and lines of a block without
-    a language are commands.
+    command or script printed, to the letter but for lines that a line "…" stands for, sh is not run, and lines of a
+    block without a language are commands.
     """
     done, printed, end, scripts = [], "", 0, [] if scripts is None else scripts
     for block in BLOCK.finditer(text):
