@@ -93,8 +93,10 @@ class PersonMotion:
         found = Motion(np.empty((n, 2)), np.empty((n, len(TIMES), 2)), np.empty((n, 2)), np.empty((n, 3)))
         state = self.recent, self.sums, self.spread, self.pooled
         out = found.vel, found.slope, found.place, found.noise
-        rows = map(np.ascontiguousarray, (step, person, pos, time))  # of one type, so that numba compiles once
-        add_to_motion(*rows, self.chord, np.array(TIMES), settings, *state, *out)
+        # of one type, so that numba compiles once
+        step, person = np.ascontiguousarray(step), np.ascontiguousarray(person)
+        pos, time = np.ascontiguousarray(pos), np.ascontiguousarray(time)
+        add_to_motion(step, person, pos, time, self.chord, np.array(TIMES), settings, *state, *out)
         return found
 
     def new(self, pos: Array, vel: Array) -> Motion:
