@@ -40,7 +40,7 @@ def lines(camera: Camera) -> tuple[Array, Array]:
 def ball(o: Array, d: Array, centre: Array, shape: Array) -> Array:
     """Where o + t d first meets (x - c)ᵀ S⁻¹ (x - c) = 1."""
     M, w = np.linalg.inv(shape), o - centre
-    a, b, c = (np.einsum("ni,ij,nj->n", x, M, y) for x, y in ((d, d), (w, d), (w, w)))
+    a, b, c = (np.einsum("ni,ni->n", x @ M, y) for x, y in ((d, d), (w, d), (w, w)))  # x @ M @ y of each row
     root = b * b - a * (c - 1)
     t = (-b - np.sqrt(np.maximum(root, 0))) / a
     return np.where((root >= 0) & (t > 0), t, NEVER)

@@ -46,8 +46,9 @@ class Wayfinding:
 
         arrays = groups.arrays
         waits = (groups.queue_of >= 0) | groups.held
+        group_of = np.ascontiguousarray(groups.group_of)  # of one person, numba takes the column for another type
         changed, late = find_ways(
-            t, state, groups.present, waits, groups.group_of, groups.targets, groups.waypoint, groups.alone,
+            t, state, groups.present, waits, group_of, groups.targets, groups.waypoint, groups.alone,
             groups.aims, groups.share, groups.gone, arrays.route, arrays.kind, groups.gate, groups.beyond,
             arrays.length, arrays.current, arrays.filing, self.since, arrays.finish, navigator.nodes, navigator.far,
             navigator.closed, navigator.first, self.gate_state, 1 / SCRIPT_RATE, WAIT_TIME,

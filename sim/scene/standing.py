@@ -69,7 +69,8 @@ def _standing(box: Array, z: Array, camera: Camera) -> tuple[Array, Array]:
 
     low, size = box[:, :2], np.maximum(box[:, 2:], 1e-6)
     lens = np.array([*camera.focal_px, *camera.centre_px, camera.radial])
-    two = bodies(low, size, z, lens, camera.position, camera.rotation, PARTS)
+    eye, turn = np.array(camera.position), np.array(camera.rotation)  # of one type, so that numba compiles once
+    two = bodies(np.ascontiguousarray(low), size, z, lens, eye, turn, PARTS)
     a, b = (to_ground(camera, low + q[:, :2] * size, z) for q in two)
     return (a + b) / 2, (two[0, :, 2] + two[1, :, 2]) / 2
 

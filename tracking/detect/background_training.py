@@ -27,6 +27,7 @@ from statistics import NormalDist
 import numpy as np
 
 from scenarios.errors import InputError
+from sim.arrays import read_only
 from sim.types import Bools, Image, Ints
 from tracking.detect import background_training_kernels as kernels
 from tracking.detect.background_kernels import Floats
@@ -69,6 +70,7 @@ def train(sample: Image, rate: float, follow_gain: bool) -> Trained:
     """Returns the background model of a sample of frames (K, H, W, 3) BGR uint8. rate: detection rate of the
     thresholds; follow_gain: True estimates the brightness of each frame first. Raises InputError for a bad sample."""
     check(sample)
+    sample = read_only(sample.view())  # of one type, so that numba compiles once
     gains = frame_gains(sample) if follow_gain else np.ones((len(sample), 3), np.float32)
     size = sample.shape[1:3]
     mean, sigma = np.empty((*size, 3), np.float32), np.empty((*size, 3), np.float32)

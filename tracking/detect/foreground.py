@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 
+from sim.arrays import read_only
 from sim.types import Array, Bools, Context, Detections, Image, Tracks
 from tracking.detect import blobs
 from tracking.detect.background import Background, fused_foreground
@@ -154,7 +155,8 @@ class Foreground:
             self.stabiliser = self._watch
             return self.segment(given)
         flooded = self.model.settings.adaptive and share > MOST_FOREGROUND
-        return Segmented(image, classes, mask, not flooded, shown)
+        # of one type, smoothed or not, so that numba compiles once
+        return Segmented(read_only(image.view()), classes, mask, not flooded, shown)
 
     def _moves(self, image: Image, foreground: float) -> bool:
         """Returns whether the camera was found to move in this picture. foreground: share of the picture."""

@@ -93,6 +93,9 @@ class PersonMotion:
         found = Motion(np.empty((n, 2)), np.empty((n, len(TIMES), 2)), np.empty((n, 2)), np.empty((n, 3)))
         state = self.recent, self.sums, self.spread, self.pooled
         out = found.vel, found.slope, found.place, found.noise
+        # of one type, so that numba compiles once
+        step, person = np.ascontiguousarray(step), np.ascontiguousarray(person)
+        pos, time = np.ascontiguousarray(pos), np.ascontiguousarray(time)
         add_to_motion(step, person, pos, time, self.chord, np.array(TIMES), settings, *state, *out)
         return found
 
@@ -116,7 +119,7 @@ class SteadyPlaces:
     """
 
     def __init__(self, fps: float) -> None:
-        self.fps, self.size = fps, frames_per_step(fps)
+        self.fps, self.size = float(fps), frames_per_step(fps)
         stay = np.exp(-1 / (fps * CORRELATION))
         self.times = (1 + stay) / (1 - stay)
         self.noise, self.latest = np.zeros((0, 2)), np.full(2, FIRST[0] ** 2)
@@ -127,7 +130,7 @@ class SteadyPlaces:
         seen, noise (S, 3): people in the steps that end in these frames, and the noise of their positions then."""
         from tracking.grouping.motion_kernels import filter_places
 
-        out, variance = pos.copy(), np.maximum(noise[:, [0, 2]], 0.0)
+        out, variance = pos.copy(), np.ascontiguousarray(np.maximum(noise[:, [0, 2]], 0.0))
         filter_places(
             frame, person, pos, seen.step, seen.column, variance, self.size, self.fps, STEADY, self.times,
             self.noise, self.latest, self.state, self.cov, self.last, out,

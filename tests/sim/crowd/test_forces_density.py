@@ -25,7 +25,7 @@ def test_speed_falls_with_density_as_weidmann_measured(density: float) -> None:
 @pytest.mark.parametrize("name", ["2, 3 stairs", "6 round", "10 allocation", "15 many"])
 def test_a_row_of_the_guideline_passes(name: str) -> None:
     test = next(test for test in rimea.TESTS if test.name.startswith(name))
-    assert rimea.cell(test, range(SEED, SEED + 2), 1, lambda scene, seed: rimea.ours(scene, seed, 1)).endswith("✓")
+    assert rimea.cell(test, range(SEED, SEED + 1), 1, lambda scene, seed: rimea.ours(scene, seed, 1)).endswith("✓")
 
 
 def test_people_who_meet_form_lanes() -> None:

@@ -86,12 +86,12 @@ def test_plain_looks_are_those_without_the_table() -> None:
 
 
 def test_shadows_of_limbs_and_things_fall_where_they_stand_before_the_sun() -> None:
-    motion, camera = dressed().replace(scene=Scene(np.array([16.0, 10.0]))), small(pinhole(40.0), 0.5)
+    motion, camera = dressed().replace(scene=Scene(np.array([16.0, 10.0]))), small(pinhole(40.0), 0.3)
     made = Renderer(motion, camera, Light(shadow=0.5, penumbra=0.0))
     seen, sun = slow.look(camera, motion, 5), made.illumination.sun
     shadow = slow.in_shadow(seen.place, motion, 5, sun) & (seen.ids == 0) & np.isfinite(seen.depth)
     ratio = made.frame(5).astype(float).sum(2) / made.background(49).astype(float).sum(2)
-    inside = shadow & np.roll(shadow, 3, 0) & np.roll(shadow, -3, 0) & np.roll(shadow, 3, 1) & np.roll(shadow, -3, 1)
+    inside = shadow & np.roll(shadow, 2, 0) & np.roll(shadow, -2, 0) & np.roll(shadow, 2, 1) & np.roll(shadow, -2, 1)
     assert inside.sum() > 60
     assert np.median(np.abs(ratio[inside] - 0.5)) < 0.03
 

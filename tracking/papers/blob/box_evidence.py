@@ -115,7 +115,7 @@ class BoxEvidence:
         longer `free` (M,), which is changed in place."""
         people = self.people
         d2, log_det = people.innovations(np.ascontiguousarray(z[:, :4]), self.noise)
-        rows, columns = np.nonzero(d2 <= gate)
+        rows, columns = map(np.ascontiguousarray, np.nonzero(d2 <= gate))  # else one pair is another type to numba
         d2 = d2[rows, columns]
         evidence = people.evidence(rows, d2, log_det[rows])
         pairs, shared = self.shared_boxes(box, columns, evidence)

@@ -16,6 +16,7 @@ from tracking.papers.blob import person_template_search_kernels as search
 from tracking.papers.blob.person_look_kernels import POINTS
 from tracking.papers.blob.person_template_kernels import Cover, kernel
 
+NO_IMAGE = np.zeros((0, 0, 3), np.uint8)  # read-only in kernels, as pictures are: fit_places is compiled once
 EVIDENCE = 1000.0  # log-likelihood of full support: so large that the first guess hardly restrains a template
 
 
@@ -33,12 +34,12 @@ def fit_new_people(
     foreground, -1/2 for background. Each template must have the share `support` of its own.
     """
     best, worth = np.zeros((0, 4)), 0.0
-    no_image, no_looks = np.zeros((0, 0, 3), np.uint8), np.zeros((0, POINTS, 5))
+    no_looks = np.zeros((0, POINTS, 5))
     first = 0
     for count in range(1, most + 1):
         one, far = guesses[first : first + count], spread[first : first + count]
         first += count
-        at = search.fit_places(foreground, cover, one, far, EVIDENCE, no_image, no_looks)
+        at = search.fit_places(foreground, cover, one, far, EVIDENCE, NO_IMAGE, no_looks)
         alone = kernels.supports(foreground, cover, at, 1)
         kernels.paint_all(cover, at, -1)
         value = joint_support(foreground, cover, at) / person - count * support

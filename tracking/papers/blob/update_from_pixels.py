@@ -219,7 +219,8 @@ class PixelUpdater:
         """Returns the measurements by ellipses z (M, 5), the rows of z associated, and those in any gate."""
         gated_var = np.full(len(z), np.inf) if self.size.above else angle_var
         d2, log_det = self.people.directed_innovations(z, gated_var)
-        rows, gated = np.nonzero(d2 <= self.gates[kalman.directed(gated_var).astype(int)])
+        near = d2 <= self.gates[kalman.directed(gated_var).astype(int)]
+        rows, gated = map(np.ascontiguousarray, np.nonzero(near))  # else one pair is another type to numba
         d2, log_det = d2[rows, gated], log_det[rows, gated]
         best = self.people.associate(rows, gated, d2, self.people.evidence(rows, d2, log_det))
         rows, taken = rows[best], gated[best]

@@ -95,7 +95,7 @@ class ReportedEvents:
         group[0] = known_groups(self.people.identities.groups, id)
         # the memory decides of people who are missed: what cannot be seen changes nothing
         value = np.where(np.isnan(log_odds), belief.neutral, log_odds)
-        a, b = np.nonzero(np.triu(value != UNSEEN, 1))
+        a, b = map(np.ascontiguousarray, np.nonzero(np.triu(value != UNSEEN, 1)))  # else one pair is another type
         linked_groups(
             np.array([0, 0, len(a)]), a, b, value[a, b], UNSEEN, belief.stay, belief.come, belief.nearest, group
         )

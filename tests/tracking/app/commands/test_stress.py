@@ -67,7 +67,7 @@ def test_two_axes_make_a_matrix(scene: str, capsys) -> None:
 
 
 def test_one_axis_is_told_by_both_measures(scene: str, capsys) -> None:
-    assert stress(scene, "--vary", "detection=1.0:0.4", "--episodes", "40", seeds="0:8") == 0
+    assert stress(scene, "--vary", "detection=1.0:0.4", "--episodes", "15", seeds="0:8") == 0
     text = capsys.readouterr().out
     data = json.loads(Path("o/stress.json").read_text())
     tracker, oracle = data["curves"][FAKE], data["curves"]["oracle"]

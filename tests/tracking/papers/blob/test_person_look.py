@@ -38,6 +38,7 @@ def test_fits_are_the_slow_way(seed):
     image = r.integers(0, 256, (HIGH, WIDE, 3)).astype(np.uint8)
     seen = np.arange(looks.POINTS) % 6
     look = np.column_stack([r.uniform(0, 255, (looks.POINTS, 3)), r.uniform(50, 9000, looks.POINTS), seen])
+    image.setflags(write=False)
     for k in range(len(some)):
         got = looks.look_fits(image, cover, some, k, look, 2, 1.5)
         assert np.allclose(got, slow.fits(image, cover, some, k, look, 2, 1.5), atol=1e-9)
@@ -46,6 +47,7 @@ def test_fits_are_the_slow_way(seed):
 def test_fits_of_pairs_are_the_slow_way():
     r, _, cover, some = scenery(3)
     image = r.integers(0, 256, (HIGH, WIDE, 3)).astype(np.uint8)
+    image.setflags(write=False)
     seen = np.full((2, looks.POINTS, 1), 9.0)
     look = np.concatenate([r.uniform(0, 255, (2, looks.POINTS, 3)), r.uniform(50, 9000, seen.shape), seen], 2)
     rows, columns = np.array([1, 0, 1]), np.array([0, len(some) - 1, 1])
