@@ -119,7 +119,7 @@ def merge(below: Table, above: Table) -> Table:
 
 def _merge_value(key: str, below: Any, above: Any) -> Any:
     if isinstance(below, dict) and isinstance(above, dict):
-        whole = key == "when" or (bool(above) and above.keys() <= DRAW_KEYS)
+        whole = key == "when" or (bool(above) and above.keys() <= DRAW_KEYS) or above.keys() >= {"at", "value"}
         return above if whole else merge(below, above)
     if _has_ids(below) and _has_ids(above):
         rows = list(below)

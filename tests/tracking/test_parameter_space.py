@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from scenarios.errors import InputError
 from tracking.config import Config, param
-from tracking.parameter_space import decode, decode_and_build, encode
+from tracking.parameter_space import decode, decode_and_build, encode, moved
 from tracking.running.tracker_registry import find, names
 
 CONFIGS = [find(name).config_class for name in names()]
@@ -53,6 +53,19 @@ def test_there_and_back(gate, rate, count, kind, on):
     again = decode(SPACE, encode(SPACE, config), Mixed())
     assert (again.count, again.kind, again.on) == (count, kind, on)
     assert (again.gate, again.rate) == pytest.approx((gate, rate), rel=1e-12)
+
+
+def test_residuals_lead_from_the_base_to_the_ends():
+    base = Mixed(gate=3.5, rate=0.37, count=4, kind="c", on=False, fixed=0.2)
+    origin = encode(SPACE, base)
+    assert origin == pytest.approx([0.25, np.log10(0.37) / 2, 0.0, 2 / 3, 0.5])
+    assert decode(SPACE, moved(SPACE, np.zeros(5), base), base) == base, "to the last bit"
+    for end in (-1.0, 1.0):
+        assert moved(SPACE, np.full(5, end), base) == pytest.approx([end] * 5, abs=1e-12)
+        assert moved(SPACE, np.full(5, 3 * end), base) == pytest.approx([end] * 5, abs=1e-12)
+        assert moved(SPACE, np.full(5, end / 2), base) == pytest.approx((origin + end) / 2)
+    with pytest.raises(InputError, match="action"):
+        moved(SPACE, [0.0] * 4, base)
 
 
 @given(st.lists(st.floats(-3, 3), min_size=5, max_size=5))

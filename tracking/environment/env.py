@@ -277,7 +277,9 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
         if not fitting:
             names, seeds = sorted({_scenario(s) for s in self.sources}), sorted({s.seed for s in self.sources})
             expected = f"one of {', '.join(names)}, with a seed from {seeds[0]} to {seeds[-1]}"
-            raise InputError(place="options", got=f"{name}, {seed}", expected=expected, remedy="correct the options")
+            raise InputError(
+                place="options", got=f"scenario {name}, seed {seed}", expected=expected, remedy="correct the options"
+            )
         return fitting[int(self.np_random.integers(len(fitting)))]
 
     def _observe(self) -> Floats:
@@ -344,6 +346,9 @@ def _action_parameters(kind: type[Config], mode: DetectionMode, every: int | Non
 def _presets(
     kind: type[Config], actions: Actions, presets: Iterable[Params], space: Space, defaults: Config
 ) -> tuple[Config, ...]:
+    if isinstance(presets, str | Mapping) or not isinstance(presets, Iterable):
+        got, expected = repr(presets), "a list of configs, tables or parameter files"
+        raise InputError(place="presets", got=got[:80], expected=expected, remedy=f"write [{got[:40]}]")
     found = tuple(config_of(kind, one) for one in presets)
     if (actions == "presets") != bool(found):
         got = f"{len(found)} presets with actions={actions!r}"

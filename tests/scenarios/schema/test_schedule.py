@@ -12,6 +12,7 @@ from scenarios.drawing.words import text
 from scenarios.errors import InputError
 from scenarios.loading.resolve import load
 from scenarios.loading.toml_files import dump
+from scenarios.schema.schedule import Schedule
 from sim.draws import drawn
 
 FALLS = "sensor.detect_prob={at=[0, 20, 40], value=[0.95, 0.6, 0.9], ramp=5}"
@@ -50,6 +51,23 @@ def test_settings_replace_a_schedule_and_values_in_it() -> None:
     assert scenario.sensor.detect_prob.value == (0.95, 0.3, 0.9)  # type: ignore[union-attr]
     assert scenario.sensor.detect_prob.ramp == 2  # type: ignore[union-attr]
     assert load("cross", [FALLS, "sensor.detect_prob=0.5"]).sensor.detect_prob == 0.5
+
+
+@pytest.mark.parametrize(
+    "below", ["{ at = [0, 20, 40], value = [0.9, 0.6, 0.8], ramp = 5 }", "{ uniform = [0.2, 0.4] }"]
+)
+def test_a_schedule_replaces_what_the_base_has_as_a_whole(below: str, tmp_path: Path) -> None:
+    base, above = tmp_path / "base.toml", tmp_path / "above.toml"
+    base.write_text(
+        f'extends = "cross"\n[sensor]\ndetect_prob = {below}\nfalse_alarms = {{ life = 3, at = [[0.5, 0.5]] }}\n'
+    )
+    text = "[sensor]\ndetect_prob = { at = [0, 5], value = [1, 0.5] }\nfalse_alarms = { at = [[0.1, 0.2]] }\n"
+    above.write_text(f'extends = "base.toml"\n{text}')
+    found = load(above)
+    assert found.sensor.detect_prob == Schedule(at=(0, 5), value=(1, 0.5))
+    assert found.sensor.false_alarms is not None
+    assert found.sensor.false_alarms.life == 3
+    assert found.draws is None
 
 
 PROB = "sensor.detect_prob"

@@ -26,8 +26,8 @@ from tests.toy_tracker import Toy
 from tracking.config import Config, param
 from tracking.environment.env import TuningEnv
 from tracking.episodes.episode_cache import SourceCache
-from tracking.running.signals import NAMES
 from tracking.parameter_space import encode
+from tracking.running.signals import NAMES
 from tracking.running.tracker_registry import names
 
 ID = "flockscope/Tuning-v0"
@@ -112,11 +112,11 @@ def test_a_scene_without_people_or_tracks_is_right():
     plain = simulate(load("cross", TINY), 3, 0, ())
     truth = plain.truth
     late = truth.frame > 10
-    held = {f.name for f in dataclasses.fields(truth)} & set(
-        "frame id group pos vel box visibility visible_box z".split()
-    )
+    held = ("frame", "id", "group", "pos", "vel", "box", "visibility", "visible_box", "z")
     late = truth.replace(
-        **{n: getattr(truth, n)[late] for n in held if getattr(truth, n) is not None}, groups=(Groups.none(),) * 15, events=()
+        **{n: getattr(truth, n)[late] for n in held if getattr(truth, n) is not None},
+        groups=(Groups.none(),) * 15,
+        events=(),
     )
     empty = [f.replace(detections=f.detections.keep(np.zeros(0, np.int64))) for f in plain]
     other = dataclasses.replace(plain, load_truth=lambda: late, frames=lambda: iter(empty), bare=None)
@@ -288,6 +288,8 @@ WRONG_ARGUMENTS = [
     ("blob", {"margin": float("nan")}, "margin: got nan"),
     ("blob", {"actions": "presets"}, "0 presets with actions='presets'"),
     ("blob", {"presets": [{}]}, "1 presets with actions='residual'"),
+    ("blob", {"actions": "presets", "presets": {"gate": 0.97}}, r"write \[\{'gate': 0.97\}\]"),
+    ("blob", {"actions": "presets", "presets": 3}, "got 3; expected a list of configs"),
     ("blob", {"actions": "presets", "presets": [{"gaet": 0.5}]}, "did you mean gate"),
     ("blob", {"actions": "presets", "presets": [{}, {"management": "rho"}], "decision_every": 5},
      r"presets\[1\]: got another management; expected a parameter that may change here"),
@@ -324,7 +326,7 @@ def test_vectors_begin_new_episodes_as_gymnasium_says(mode):
     zero = np.zeros(envs.action_space.shape, np.float32)
     single = [played(make(**made), seed=seed) for seed in (1, 2)]
     steps = [envs.step(zero) for _ in range(2)]
-    assert np.array([step[1] for step in steps]).T == pytest.approx(np.array([one[1] for one in single]))
+    assert pytest.approx(np.array([one[1] for one in single])) == np.array([step[1] for step in steps]).T
     assert [step[2].tolist() for step in steps] == [[False, False], [True, True]]
     last = steps[-1][4]["final_obs"] if mode == AutoresetMode.SAME_STEP else steps[-1][0]
     assert np.array_equal(np.stack(list(last)), [one[0][-1] for one in single])
@@ -356,7 +358,9 @@ def test_processes_beside_each_other():
 
 def test_usual_wrappers_fit():
     """What learners put around an environment: other ranges, statistics of episodes, a limit of steps."""
-    env = RecordEpisodeStatistics(RescaleAction(FlattenObservation(make(decision_every=4)), np.float32(0), np.float32(1)))
+    env = RecordEpisodeStatistics(
+        RescaleAction(FlattenObservation(make(decision_every=4)), np.float32(0), np.float32(1))
+    )
     env.reset(seed=0)
     for _ in range(4):
         *_, ended, _, info = env.step(np.full(env.action_space.shape, 0.5, np.float32))

@@ -110,10 +110,10 @@ def test_a_covariance_of_place_and_velocity_counts() -> None:
 def test_a_movement_common_to_all_is_told_from_errors_of_each() -> None:
     """A camera that moves shifts all by one vector; noise does not."""
     people, off = np.array(walk(1, 4)), np.array([[0.1, 0], [-0.1, 0], [0, 0.1], [0, -0.1]])
-    common = [(frame(1), tracks(1, people, 0)), (frame(2, people + [0.3, 0.4]), tracks(2, people))]
+    common = [(frame(1), tracks(1, people, 0)), (frame(2, people + np.array([0.3, 0.4])), tracks(2, people))]
     expect(looked(common), shift=0.5, residual=0.5)
     expect(looked([common[0], (frame(2, people + off), tracks(2, people))]), shift=0, residual=0.1)
-    two = [(frame(1), tracks(1, people[:2], 0)), (frame(2, people[:2] + [0.3, 0.4]), tracks(2, people[:2]))]
+    two = [(frame(1), tracks(1, people[:2], 0)), (frame(2, people[:2] + np.array([0.3, 0.4])), tracks(2, people[:2]))]
     expect(looked(two), shift=0, residual=0.5)
 
 
@@ -182,8 +182,11 @@ def test_in_the_image_lengths_are_heights_of_people() -> None:
     at = np.array([[100.0, 100], [300, 100]])
     cov = np.tile(np.diag([25.0, 25.0, 0.0, 0.0]), (2, 1, 1))
     before = tracks(1, at, (100, 0), plane="image", box=boxes(at), cov=cov)
-    after = tracks(2, at + [10, 0], (100, 0), plane="image", box=boxes(at + [10, 0]))
-    pair = [(frame(1, plane="image"), before), (frame(2, at + [10, 5], plane="image", box=boxes(at + [10, 5])), after)]
+    after = tracks(2, at + np.array([10, 0]), (100, 0), plane="image", box=boxes(at + np.array([10, 0])))
+    pair = [
+        (frame(1, plane="image"), before),
+        (frame(2, at + np.array([10, 5]), plane="image", box=boxes(at + np.array([10, 5]))), after),
+    ]
     expect(looked(pair, 50.0), residual=0.1, nis=0.5, found=1, speed=2)
     expect(looked(pair), speed=0)
     expect(looked(pair, 0.0), speed=0)
@@ -197,7 +200,12 @@ def test_tracks_on_the_ground_are_compared_with_boxes_by_their_own() -> None:
     """Without predictions: a box that stands still is where it was. There is no variance of it."""
     at = np.array([[100.0, 100], [300, 100]])
     answers = [tracks(k, walk(k), box=boxes(at)) for k in (1, 2)]
-    seen = looked([(frame(1), answers[0]), (frame(2, at + [0, 5], plane="image", box=boxes(at + [0, 5])), answers[1])])
+    seen = looked(
+        [
+            (frame(1), answers[0]),
+            (frame(2, at + np.array([0, 5]), plane="image", box=boxes(at + np.array([0, 5]), 60.0)), answers[1]),
+        ]
+    )
     expect(seen, residual=0.1, nis=0, found=1, speed=1)
     points = looked([(frame(1), answers[0]), (frame(2, at, plane="image"), answers[1])])
     expect(points, residual=0, found=0, associated=0, detections=2)
