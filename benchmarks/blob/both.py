@@ -15,6 +15,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
@@ -26,7 +27,7 @@ from benchmarks.support.tables import difference_cell, head, mean_cell, row
 from sim.types import Array, DetectionMode, Detections, Frame, Tracks, Truth
 from sim.types import Sequence as Recording
 from tracking.filters import existence
-from tracking.papers.blob import box_evidence
+from tracking.papers.blob import box_evidence, ellipse_tracks
 from tracking.papers.blob.tracked_people_kernels import covered_shares
 from tracking.recordings.source import open_source
 from tracking.running.run import track
@@ -36,14 +37,43 @@ KEYS = "HOTA", "IDF1", "IDSW"
 COLUMNS = (*KEYS, "false groups a minute")
 MERGED = 1 / 3  # share of the smaller box
 LARGER, LATE, POSTER = 1.3, 2, np.array([[40.0, 60.0, 24.0, 66.0]])
+CALIBRATE, START = box_evidence.BoxEvidence.calibrate, ellipse_tracks.TrackedEllipses.start_tracks
+
+
+def usual_noise(boxes: box_evidence.BoxEvidence) -> None:
+    CALIBRATE(boxes)
+    boxes.noise = boxes.people.noise * box_evidence.BOX_NOISE
+
+
+def person_sizes(boxes: box_evidence.BoxEvidence) -> None:
+    CALIBRATE(boxes)
+    boxes.over_person = np.ones(2)
+
+
+def from_pixels_only(people: ellipse_tracks.TrackedEllipses, *new: Any, boxed: bool = False) -> None:
+    if not boxed:
+        START(people, *new)
+
+
+def one_sensor(states: Array, shown: Array, lasting: Array, standing: Array, *seen: Any) -> None:
+    existence.update(states, *seen)
+
+
 WITHOUT: dict[str, Sequence[Replacement]] = {
     "no looks": [(box_evidence, "LOOK_EVIDENCE", 0.0)],
     "nobody shares a box": [
         (box_evidence.BoxEvidence, "shared_boxes", lambda *_: (np.zeros((0, 2), int), np.zeros(0, int)))
     ],
+    "boxes start no tracks": [(ellipse_tracks.TrackedEllipses, "start_tracks", from_pixels_only)],
     "any size starts tracks": [(box_evidence.BoxEvidence, "size_ratios", lambda self, box: np.ones(len(box)))],
-    "offset and size of boxes not learned": [(box_evidence.BoxEvidence, "learn", lambda *_: None)],
+    "offset, size and noise of boxes not learned": [(box_evidence.BoxEvidence, "learn", lambda *_: None)],
+    "size of boxes not learned": [(box_evidence.BoxEvidence, "calibrate", person_sizes)],
+    "noise of boxes not learned": [(box_evidence.BoxEvidence, "calibrate", usual_noise)],
+    "boxes as exact as blobs": [(box_evidence, "BOX_NOISE", 1.0)],
+    "scores not learned": [(existence, "LEARNED", 0)],
+    "no people whom the detector does not see": [(existence, "update_by_detector", one_sensor)],
     "false boxes do not last": [(existence, "LASTING", 0.0)],
+    "nobody stands in the background": [(existence, "STANDING", 0.0)],
 }
 
 
