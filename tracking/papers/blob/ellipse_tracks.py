@@ -87,7 +87,7 @@ class TrackedEllipses(TrackedPeople):
     def seen_by_detector(self) -> Array:
         """Returns the probability (N,) that a person exists whom the detector can see."""
         walking = self.existence() - self.states[existence.HIDDEN] * self.standing
-        return self.existence() - walking * (1 - self.detector)
+        return np.asarray(self.existence() - walking * (1 - self.detector))
 
     def carry(self, step: Array) -> None:
         """Moves all tracks in the image by a homography `step` (3, 3), as its reference follows the camera."""
