@@ -2,7 +2,7 @@
 
     python -m benchmarks.blob options [--scenes 30] [--data FOLDER]
     python -m benchmarks.blob ground [--seeds 0:2]
-    python -m benchmarks.blob both [pets] [rendered] [faults] [evidence] [--data FOLDER] [--seeds 0:2]
+    python -m benchmarks.blob both [pets] [rendered] [faults] [standing] [evidence] [--data FOLDER] [--seeds 0:2]
     python -m benchmarks.blob pixels [pets] [rendered] [hall] [standing] [above] [--data FOLDER] [--seeds 0:2]
     python -m benchmarks.blob degraded [grey] [tinted] [mpeg2] … [--seeds 20000:20002]
 
@@ -19,7 +19,7 @@ PARTS = {
     "options": (),
     "ground": (),
     "degraded": tuple(degraded.KINDS),
-    "both": ("pets", "rendered", "faults", "evidence"),
+    "both": ("pets", "rendered", "faults", "standing", "evidence"),
     "pixels": ("pets", "rendered", "hall", "standing", "above"),
 }
 

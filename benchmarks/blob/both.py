@@ -7,6 +7,7 @@ pets: PETS09-S2L1-first200 with its det/det.txt; it has no labelled groups.
 rendered: the scenes of mode `pixels`, with the boxes of their sensor.
 faults: the same with faults of the detector: all boxes 30 % too large; two frames late; only people in the nearer half;
 a poster that is always detected; one box round people whose boxes share a third; no box in every second frame.
+standing: standing.toml, where people stand from the first frame to the last, with the background spread over it.
 evidence: rendered, without one kind of evidence; differences from all.
 """
 
@@ -15,18 +16,22 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
 import tracking
-from benchmarks.blob.pixels import SCENES, rendered_scene
+from benchmarks.blob.pixels import HERE, LONGEST, SCENES, rendered_scene, with_spread_background
+from benchmarks.support.in_memory import people_in_view
 from benchmarks.support.replaced_code import Replacement, replaced_code
 from benchmarks.support.tables import difference_cell, head, mean_cell, row
+from scenarios.loading.resolve import load
+from sim.sequence import simulate
 from sim.types import Array, DetectionMode, Detections, Frame, Tracks, Truth
 from sim.types import Sequence as Recording
 from tracking.filters import existence
-from tracking.papers.blob import box_evidence
+from tracking.papers.blob import box_evidence, ellipse_tracks
 from tracking.papers.blob.tracked_people_kernels import covered_shares
 from tracking.recordings.source import open_source
 from tracking.running.run import track
@@ -36,58 +41,97 @@ KEYS = "HOTA", "IDF1", "IDSW"
 COLUMNS = (*KEYS, "false groups a minute")
 MERGED = 1 / 3  # share of the smaller box
 LARGER, LATE, POSTER = 1.3, 2, np.array([[40.0, 60.0, 24.0, 66.0]])
+CALIBRATE, START = box_evidence.BoxEvidence.calibrate, ellipse_tracks.TrackedEllipses.start_tracks
+
+
+def usual_noise(boxes: box_evidence.BoxEvidence) -> None:
+    CALIBRATE(boxes)
+    boxes.noise = boxes.people.noise * box_evidence.BOX_NOISE
+
+
+def person_sizes(boxes: box_evidence.BoxEvidence) -> None:
+    CALIBRATE(boxes)
+    boxes.over_person = np.ones(2)
+
+
+def from_pixels_only(people: ellipse_tracks.TrackedEllipses, *new: Any, boxed: bool = False) -> None:
+    if not boxed:
+        START(people, *new)
+
+
+def one_sensor(states: Array, shown: Array, lasting: Array, standing: Array, *seen: Any) -> None:
+    existence.update(states, *seen)
+
+
 WITHOUT: dict[str, Sequence[Replacement]] = {
     "no looks": [(box_evidence, "LOOK_EVIDENCE", 0.0)],
     "nobody shares a box": [
         (box_evidence.BoxEvidence, "shared_boxes", lambda *_: (np.zeros((0, 2), int), np.zeros(0, int)))
     ],
+    "boxes start no tracks": [(ellipse_tracks.TrackedEllipses, "start_tracks", from_pixels_only)],
     "any size starts tracks": [(box_evidence.BoxEvidence, "size_ratios", lambda self, box: np.ones(len(box)))],
-    "offset and size of boxes not learned": [(box_evidence.BoxEvidence, "learn", lambda *_: None)],
+    "offset, size and noise of boxes not learned": [(box_evidence.BoxEvidence, "learn", lambda *_: None)],
+    "size of boxes not learned": [(box_evidence.BoxEvidence, "calibrate", person_sizes)],
+    "noise of boxes not learned": [(box_evidence.BoxEvidence, "calibrate", usual_noise)],
+    "boxes as exact as blobs": [(box_evidence, "BOX_NOISE", 1.0)],
+    "scores not learned": [(existence, "LEARNED", 0)],
+    "no people whom the detector does not see": [(existence, "update_by_detector", one_sensor)],
     "false boxes do not last": [(existence, "LASTING", 0.0)],
+    "nobody stands in the background": [(existence, "STANDING", 0.0)],
 }
 
 
 def both(parts: Sequence[str], pets_folder: Path, seeds: range) -> None:
     """Prints the tables of the chosen parts."""
-    made = (
-        [rendered_scene(name, tilt, seed, False) for name, tilt in SCENES for seed in seeds]
-        if parts != ["pets"]
-        else []
-    )
     if "pets" in parts:
         inputs("PETS", [open_source(pets_folder, images=True)[0]])
-    if "rendered" in parts:
-        inputs("rendered", made)
+    if "standing" in parts:
+        inputs("people who stand", [standing_scene(seed) for seed in seeds])
+    if {"rendered", "faults", "evidence"}.isdisjoint(parts):
+        return
+    made = [rendered_scene(name, tilt, seed, False) for name, tilt in SCENES for seed in seeds]
+    known = inputs("rendered", made) if "rendered" in parts else {}
     if "faults" in parts:
-        alone = np.array([scores(scene, "image") for scene in made])
+        alone = known["pixels"] if known else scores_of(made, "image")
         for title, fault in FAULTS.items():
             inputs(title, [with_fault(scene, fault) for scene in made], alone)
     if "evidence" in parts:
-        evidence(made)
+        evidence(made, known["both"] if known else scores_of(made, "both"))
 
 
-def inputs(title: str, scenes: Sequence[Recording], pixels: Array | None = None) -> None:
+def standing_scene(seed: int) -> Recording:
+    """Returns a rendered scene in which some people stand all the time, with its pictures in memory."""
+    stays = [f"group.{who}.stops.0.until=[600]" for who in ("alone", "talk")]
+    live = simulate(load(HERE / "standing.toml", set=stays), seed)
+    return with_spread_background(people_in_view(live, LONGEST))
+
+
+def inputs(title: str, scenes: Sequence[Recording], pixels: Array | None = None) -> dict[str, Array]:
     """Prints a row for each input, and one for the difference of both from the better one alone; pixels (S, 4): scores
-    from pixels, if known."""
+    from pixels, if known. Returns the scores (S, 4) by input."""
     head([title, *COLUMNS])
-    modes = {name: mode for name, mode in MODES.items() if pixels is None or name != "pixels"}
-    found = {name: np.array([scores(scene, mode) for scene in scenes]) for name, mode in modes.items()}
-    found = found if pixels is None else {"pixels": pixels, **found}
+    known = {} if pixels is None else {"pixels": pixels}
+    found = {name: known[name] if name in known else scores_of(scenes, mode) for name, mode in MODES.items()}
     for name, values in found.items():
         row([name, *cells(values, mean_cell)])
     best = np.stack([found["pixels"], found["boxes"]])
     better = np.concatenate([best.max(0)[:, :2], best.min(0)[:, 2:]], 1)
     row(["both - better", *cells(found["both"] - better, difference_cell)])
+    return found
 
 
-def evidence(scenes: Sequence[Recording]) -> None:
-    """Prints what each kind of evidence adds."""
+def evidence(scenes: Sequence[Recording], base: Array) -> None:
+    """Prints what each kind of evidence adds. base (S, 4): scores of all evidence."""
     head(["without one kind of evidence", *COLUMNS])
-    base = np.array([scores(scene, "both") for scene in scenes])
     row(["both", *cells(base, mean_cell)])
     for name, change in WITHOUT.items():
         with replaced_code(change):
-            row([name, *cells(np.array([scores(scene, "both") for scene in scenes]) - base, difference_cell)])
+            row([name, *cells(scores_of(scenes, "both") - base, difference_cell)])
+
+
+def scores_of(scenes: Sequence[Recording], mode: DetectionMode) -> Array:
+    """Returns the scores (S, 4) of S scenes."""
+    return np.array([scores(scene, mode) for scene in scenes])
 
 
 def cells(values: Array, cell: Callable[..., str]) -> list[str]:

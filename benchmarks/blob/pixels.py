@@ -121,9 +121,14 @@ def rendered_scene(name: str, tilt: int, seed: int, bare: bool) -> Recording:
     video = people_in_view(live, LONGEST)
     if not bare:
         return video
+    return replace(with_spread_background(video), camera=None, scene=None, px_per_m=float("nan"))
+
+
+def with_spread_background(video: Recording) -> Recording:
+    """Returns a video with 50 of its pictures as the background sample."""
     frames = list(video.frames())
     spread = np.stack([frames[k].image for k in np.linspace(0, len(frames) - 1, 50).astype(int)])
-    return replace(video, camera=None, scene=None, px_per_m=float("nan"), load_background=lambda: spread)
+    return replace(video, load_background=lambda: spread)
 
 
 def people_who_stand(name: str, clips: dict[str, list[str]], seeds: range) -> None:

@@ -29,6 +29,7 @@ LIFETIME = 15.0  # s: mean time that a person is in view
 CLUTTER_TIME = 0.05  # s: mean time that a false box lasts
 LASTING = 0.05  # share of a detector's false boxes that last, as on a poster
 BIRTH_RATE = 0.5  # 1/s: new people
+STANDING = 0.05  # share of the people in the first picture who stand in all pictures of the background
 SHOWN_TIME = 1.0  # s: mean time in which a person can be detected
 
 
@@ -69,20 +70,24 @@ def shown_share(hidden_time: float) -> float:
 
 
 def update_by_detector(
-    states: Array, shown: Array, lasting: Array, rows: Ints, p: Array, g: Array, ratio: Array
+    states: Array, shown: Array, lasting: Array, standing: Array, rows: Ints, p: Array, g: Array, ratio: Array
 ) -> None:
-    """Updates `states` (3, N), `shown` (N,) and `lasting` (N,) in place with a detector's boxes beside pictures.
+    """Updates `states` (3, N), `shown`, `lasting` and `standing` (N,) in place with a detector's boxes beside pictures.
 
-    rows, p, g, ratio: as of `update`. shown: probability that a person can be seen by the detector, whether or not in
-    the picture. lasting: probability that what is no person and no passing false object is a lasting false one.
+    rows, p, g, ratio: as of `update`. shown: probability that a person who walks can be seen by the detector, whether
+    or not in the picture. lasting: probability that what is no person and no passing false object is a lasting false
+    one. standing: probability that a hidden person stands in the background, and can be seen by the detector only.
     """
     nothing, person, false = 1 - states.sum(0), 1 - p, 1 - p
     measured = p[rows] * g
     person[rows] += measured * ratio
     false[rows] += measured
-    likely = shown * person + (1 - shown)
-    shown *= person / likely
-    states[[SHOWN, HIDDEN]] *= likely
+    walking = shown * person + (1 - shown)
+    hidden = standing * person + (1 - standing) * walking
+    shown *= person / walking
+    standing *= person / hidden
+    states[SHOWN] *= walking
+    states[HIDDEN] *= hidden
     states[FALSE] *= false
     lasts, gone = nothing * lasting * false, nothing * (1 - lasting)
     lasting[:] = lasts / np.maximum(lasts + gone, 1e-300)

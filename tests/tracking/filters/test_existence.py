@@ -38,21 +38,25 @@ def test_a_miss_lowers_existence_by_as_much_as_the_person_could_be_seen():
 
 
 def test_two_sensors_are_weighed_by_bayes_rule():
-    """The states are enumerated: seen by the picture or not, by the detector or not, false, lasting false, gone."""
-    p, g, ratio, shown, lasting = 0.6, 5.0, 2.0, 0.7, 0.3
+    """The states are enumerated: seen by the picture or not, by the detector or not, in the background, false, lasting
+    false, gone."""
+    p, g, ratio, shown, lasting, standing = 0.6, 5.0, 2.0, 0.7, 0.3, 0.4
     measured, false, missed = 1 - p + p * g * ratio, 1 - p + p * g, 1 - p
     for rows, likely, unlikely in (([0], measured, false), ([], missed, missed)):
         made, detector, lasts = states([0.3, 0.2, 0.4]), np.array([shown]), np.array([lasting])
+        still = np.array([standing])
         k = len(rows)
         values = np.array([p]), np.full(k, g), np.full(k, ratio)
-        existence.update_by_detector(made, detector, lasts, np.array(rows, int), *values)
+        existence.update_by_detector(made, detector, lasts, still, np.array(rows, int), *values)
         seen, unseen = shown * likely, 1 - shown
-        weights = [0.3 * seen, 0.3 * unseen, 0.2 * seen, 0.2 * unseen, 0.4 * unlikely]
+        walking = 0.2 * (1 - standing)
+        weights = [0.3 * seen, 0.3 * unseen, walking * seen, walking * unseen, 0.2 * standing * likely, 0.4 * unlikely]
         weights = np.array([*weights, 0.1 * lasting * unlikely, 0.1 * (1 - lasting)])
         weights /= weights.sum()
-        assert made[:, 0] == pytest.approx([weights[:2].sum(), weights[2:4].sum(), weights[4]])
+        assert made[:, 0] == pytest.approx([weights[:2].sum(), weights[2:5].sum(), weights[5]])
         assert detector[0] == pytest.approx((weights[0] + weights[2]) / weights[:4].sum())
-        assert lasts[0] == pytest.approx(weights[5] / weights[5:].sum())
+        assert still[0] == pytest.approx(weights[4] / weights[2:5].sum())
+        assert lasts[0] == pytest.approx(weights[6] / weights[6:].sum())
 
 
 def test_a_person_is_shown_for_a_share_of_the_time():

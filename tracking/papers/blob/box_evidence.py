@@ -66,7 +66,7 @@ class BoxEvidence:
         people.update(rows, z[columns], np.tile(self.noise, (len(rows), 1)), np.full(len(rows), np.inf))
         people.measure_on_ground(rows, box[columns], self.noise)
         if people.by_existence:
-            seen = (people.states, people.detector, people.lasting)
+            seen = (people.states, people.detector, people.lasting, people.standing)
             existence.update_by_detector(*seen, rows, people.detectable, np.exp(evidence), ratio[columns])
         people.measured[:] = False
         people.measured[rows] = True
@@ -125,8 +125,8 @@ class BoxEvidence:
             evidence += LOOK_EVIDENCE * fits
         kept = free[columns]
         rows, columns, d2, evidence = rows[kept], columns[kept], d2[kept], evidence[kept]
-        person = people.existence()
-        states = np.stack([person * people.detector, person * (1 - people.detector), 1 - person])
+        person, shown = people.existence(), people.seen_by_detector()
+        states = np.stack([shown, person - shown, 1 - person])
         best = people.associate(rows, columns, d2, evidence, ratio[columns], states)
         free[columns[best] if people.by_existence else columns] = False
         return rows[best], columns[best], evidence[best]

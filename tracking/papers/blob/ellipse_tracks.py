@@ -32,8 +32,9 @@ class TrackedEllipses(TrackedPeople):
     Made from config, its nominal filter and context, as TrackedPeople. State, beside that of TrackedPeople: angle (2,
     N), rows: direction of the first axis h (rad, from the abscissa, v down) and its variance (rad^2);
     nominal (5, N, 4), a bank of filters as `bank`, updated with the nominal noise, from which the uncertainty rho
-    follows; look (N, POINTS, 5), the colours of each person (person_look_kernels); angle_var_per_step, growth of the
-    direction's variance in a frame. In `bank` the coordinates are x, y, h, w: centre and full axes of the ellipse.
+    follows; look (N, POINTS, 5), the colours of each person (person_look_kernels); detector, lasting, standing (N,):
+    shown, lasting and standing of `existence.update_by_detector`; angle_var_per_step, growth of the direction's
+    variance in a frame. In `bank` the coordinates are x, y, h, w: centre and full axes of the ellipse.
     """
 
     columns: ClassVar[dict[str, int]] = {
@@ -43,10 +44,11 @@ class TrackedEllipses(TrackedPeople):
         "look": 0,
         "detector": 0,
         "lasting": 0,
+        "standing": 0,
     }
 
     def __init__(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics, context: Context) -> None:
-        self.detector, self.lasting = np.zeros((2, 0))
+        self.detector, self.lasting, self.standing = np.zeros((3, 0))
         self.angle, self.nominal, self.look = np.zeros((2, 0)), np.zeros((5, 0, 4)), person_look_kernels.unknown(0)
         super().__init__(config, dynamics, context)
 
@@ -63,12 +65,29 @@ class TrackedEllipses(TrackedPeople):
         kalman.predict(self.nominal, self.dynamics.dt, self.q)
         self.angle[kalman.DIRECTION_VAR] += self.angle_var_per_step
         nothing, person = 1 - self.states.sum(0), self.existence()
+        standing = self.states[existence.HIDDEN] * self.standing
         super().predict(observed)
+        self._keep_standing(standing)
         lost = person * -np.expm1(-self.dynamics.dt / existence.LIFETIME)
         lasting = (nothing * self.lasting + existence.LASTING * lost) / np.maximum(1 - self.states.sum(0), 1e-12)
         self.lasting = np.minimum(lasting, 1.0)
         shown, hidden = self.transition[:2, :2]
         self.detector = (shown[0] * self.detector + shown[1] * (1 - self.detector)) / (shown[0] + hidden[0])
+
+    def _keep_standing(self, standing: Array) -> None:
+        """Corrects the predicted `states` for people who stood in the background with the probability standing (N,):
+        they walk off, and are shown then, at the rate 1 / LIFETIME."""
+        show, stay = self.transition[:2, existence.HIDDEN]
+        left = standing * np.exp(-self.dynamics.dt / existence.LIFETIME)
+        stand = left * np.exp(-self.dynamics.dt / existence.LIFETIME)
+        self.states[existence.SHOWN] += left - stand - show * standing
+        self.states[existence.HIDDEN] += stand - stay * standing
+        self.standing = stand / np.maximum(self.states[existence.HIDDEN], 1e-300)
+
+    def seen_by_detector(self) -> Array:
+        """Returns the probability (N,) that a person exists whom the detector can see."""
+        walking = self.existence() - self.states[existence.HIDDEN] * self.standing
+        return np.asarray(self.existence() - walking * (1 - self.detector))
 
     def carry(self, step: Array) -> None:
         """Moves all tracks in the image by a homography `step` (3, 3), as its reference follows the camera."""
@@ -84,13 +103,19 @@ class TrackedEllipses(TrackedPeople):
         return upright(self.bank[kalman.PLACE], self.angle[kalman.DIRECTION])
 
     def start_tracks(self, z: Array, score: Array, t: float, person: Array, *, boxed: bool = False) -> None:
-        """Appends a track at rest for each ellipse z (K, 5): centre x, y, full axes h, w, px, direction theta, rad."""
+        """Appends a track at rest for each ellipse z (K, 5): centre x, y, full axes h, w, px, direction theta, rad.
+        boxed: a detector shows it, and perhaps the detector only."""
         super().start_tracks(z, score, t, person)
         if boxed:
-            self.states[existence.FALSE, self.states.shape[1] - len(z) :] *= 1 - existence.LASTING
+            new = self.states[:, self.states.shape[1] - len(z) :]
+            new[existence.FALSE] *= 1 - existence.LASTING
+            new[existence.HIDDEN] = (
+                existence.STANDING * self.unseen_from_start / self.unseen_time * new[existence.SHOWN]
+            )
+            new[existence.SHOWN] -= new[existence.HIDDEN]
         self._append(
             detector=np.full(len(z), 1.0 if boxed else existence.shown_share(self.config.hidden_time)),
-            lasting=np.full(len(z), float(boxed)),
+            lasting=np.full(len(z), float(boxed)), standing=np.full(len(z), float(boxed)),
             angle=np.stack([z[:, 4], np.full(len(z), kalman.VAGUE)]), look=person_look_kernels.unknown(len(z)),
             nominal=self.bank[:, self.bank.shape[1] - len(z) :],
         )  # fmt: skip

@@ -74,9 +74,9 @@ class TrackedPeople:
     detect_prob: that of the config, 0 in a frame that was not observed; detectable (N,): probability that a person who
     exists and is shown is measured in this frame; rho (N,): with "rho", sqrt|S| (innovation covariance) over its
     asymptote, as predicted; unseen_time: s, BIRTH_RATE times it is the expected number of people in view without a
-    track; false_density: expected false boxes in this frame per px^2 of place and m^2 of size; px_per_m: the image's
-    scale; from pixels that of the frame. Also config, context, dynamics (the nominal filter), top (True from straight
-    above), and what `follow` derives.
+    track; unseen_from_start: its part of people who were there in the first frame; false_density: expected false boxes
+    in this frame per px^2 of place and m^2 of size; px_per_m: the image's scale; from pixels that of the frame. Also
+    config, context, dynamics (the nominal filter), top (True from straight above), and what `follow` derives.
     """
 
     # Axis of the tracks in each column of the table.
@@ -97,6 +97,7 @@ class TrackedPeople:
             self.stand, self.stand_cov = np.zeros((0, 5)), np.zeros((0, 5, 5))
             self.columns = {**self.columns, "stand": 0, "stand_cov": 0}  # type: ignore[misc]
         self.states, self.unseen_time = np.zeros((3, 0)), existence.LIFETIME
+        self.unseen_from_start = self.unseen_time
         self.follow(config, dynamics)
 
     def follow(self, config: BlobConfig, dynamics: track_uncertainty.Dynamics) -> None:
@@ -253,6 +254,7 @@ class TrackedPeople:
         if last and (len(z) or len(self.id)):
             stay = np.exp(-self.dynamics.dt / existence.LIFETIME)
             self.unseen_time = stay * (1 - self.detect_prob) * self.unseen_time + self.dynamics.dt
+            self.unseen_from_start *= stay * (1 - self.detect_prob)
         return np.asarray(new / (new + c.clutter_rate + double))
 
     def delete_tracks(self, t: float) -> None:

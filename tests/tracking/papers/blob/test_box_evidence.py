@@ -10,6 +10,7 @@ import pytest
 from sim.types import Detections, Frame
 from tests import painted
 from tests.painted import FPS, TALL, box, ids, overlap
+from tracking.filters import existence
 from tracking.papers.blob import box_evidence_kernels as kernels
 from tracking.papers.blob.config import BlobConfig
 
@@ -61,12 +62,28 @@ def test_boxes_carry_a_person_while_pictures_are_lost():
 
 
 @pytest.mark.parametrize("lost", [False, True])
-def test_a_box_without_foreground_is_no_person(lost):
+def test_a_box_that_comes_without_foreground_is_no_person(lost):
     people = [[p] for p in walk(60, 180, 2, 40)]
-    boxes = [[*found, POSTER] for found in of(people)]
+    boxes = [[*found, POSTER] if k >= 5 else found for k, found in enumerate(of(people))]
     made = track(people, boxes, lost=lambda k: lost)
     shown = [any(overlap(b, POSTER) > 0.5 for b in t.box) for t in made]
-    assert sum(shown) > 30 if lost else not any(shown[10:])
+    assert sum(shown) > 25 if lost else not any(shown)
+
+
+def test_a_person_who_stands_in_the_background_is_tracked_by_boxes():
+    stands, walks = [POSTER] * 15, [box(p) for p in walk(POSTER[0] + POSTER[2] / 2, POSTER[1] + TALL, -3, 25)]
+    people = [[] if k < 15 else [(POSTER[0] + POSTER[2] / 2 - 3 * (k - 15), POSTER[1] + TALL, TALL)] for k in range(40)]
+    made = track(people, [[found] for found in stands + walks])
+    assert len(ids(made)) == 1
+    assert all(len(t.id) == 1 for t in made)
+
+
+def test_nobody_stands_in_the_background_for_ever(monkeypatch):
+    monkeypatch.setattr(existence, "LIFETIME", 1.5)
+    made = track([[]] * 60, [[POSTER]] * 60)
+    shown = [len(t.id) > 0 for t in made]
+    assert shown[0]
+    assert not any(shown[50:])
 
 
 def test_one_box_of_two_people_loses_nobody():

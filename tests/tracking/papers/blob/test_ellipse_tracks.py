@@ -7,7 +7,7 @@ import pytest
 
 from sim.scene.camera import camera_rotation
 from sim.types import Camera, Context
-from tracking.filters import kalman
+from tracking.filters import existence, kalman
 from tracking.papers.blob.config import BlobConfig
 from tracking.papers.blob.ellipse_tracks import TrackedEllipses
 from tracking.papers.blob.tracked_people_kernels import visible_shares
@@ -43,6 +43,24 @@ def test_looks_stay_with_their_people():
     one.keep_only(np.array([2, 0]))
     one.start_tracks(np.array([[50.0, 100, 68, 24, UP]]), np.ones(1), 0.0, np.ones(1))
     assert one.look[:, 0, 0].tolist() == [3, 1, 0]
+
+
+def test_who_comes_later_does_not_stand_in_the_background():
+    one, z = people([100, 100, 68, 24, UP]), np.array([[200.0, 100, 68, 24, UP]])
+    one.start_tracks(z, np.ones(1), 0.0, np.ones(1), boxed=True)
+    assert one.states[:, 1] == pytest.approx([1 - existence.STANDING, existence.STANDING, 0.0])
+    for _ in range(3):
+        one.predict()
+        one.new_people(np.zeros((0, 4)), np.zeros(0, bool))
+    one.start_tracks(z, np.ones(1), 0.3, np.ones(1), boxed=True)
+    assert one.states[existence.HIDDEN, 2] < existence.STANDING / 5
+    assert one.states[:2, 2].sum() == pytest.approx(1.0)
+
+
+def test_a_detector_sees_who_stands_and_most_who_walk():
+    one = people([100, 100, 68, 24, UP])
+    one.states[:, 0], one.detector[:], one.standing[:] = (0.5, 0.3, 0.1), 0.6, 0.5
+    assert one.seen_by_detector() == pytest.approx([0.5 * 0.6 + 0.15 * 0.6 + 0.15])
 
 
 @pytest.mark.parametrize(("x", "wide", "share"), [(123, 34, 40 / 68), (100, 16, 52 / 68)])
