@@ -250,8 +250,7 @@ class StressOptions(SceneOptions, WorkerOptions, words="stress"):
     start: int = option("Seeds that are played at first.", 4, low=2, metavar="N")
     episodes: int | None = option("Stop after about so many episodes.", None, low=1, metavar="N")
     minutes: float | None = option("Stop after about so many minutes.", None, low=0.0, metavar="M")
-    detections: Detections = option(
-        "Input of the trackers. Default: file, if they can.", None)
+    detections: Detections = option("Input of the trackers. Default: file, if they can.", None)
     step_timeout: float | None = STEP_TIMEOUT()
     fresh: bool = FRESH()
 
@@ -309,6 +308,7 @@ class TuneCommandOptions(WorkerOptions, words="tune"):
     set: list[str] = SET()
     sensor: Path | None = SENSOR()
     only: str | None = tuned("only", None)
+    adaptive: int | None = tuned("adaptive")
     out: Path = tuned("out", MISSING)
     storage: str | None = tuned("storage")
     study: str | None = tuned("study")

@@ -44,7 +44,7 @@ from tracking.grouping.grouping_choice import Grouping, default_grouping, groupi
 from tracking.running import image_scale, tracker_registry
 from tracking.running.counted_region import Mask, counted_region, detections_inside, inside_region
 from tracking.running.detection_mode import BOTH, Given, as_needed
-from tracking.running.prepare import PICTURED, Params, PreparedTracker, prepare
+from tracking.running.prepare import PICTURED, Params, PreparedTracker, check_params, prepare
 from tracking.running.run_info import run_info
 from tracking.running.time_limit import TimeLimited
 
@@ -160,6 +160,7 @@ class Live:
             if value is not None and not is_number(value, low, high):
                 expected = f"a number from {low:g} to {high:g}"
                 raise InputError(place=option, got=repr(value), expected=expected, remedy=f"correct {option}")
+        check_params(tracker, params)
         if isinstance(camera, str | Path):
             from tracking.recordings.calibration import read_calibration
 
@@ -399,6 +400,9 @@ def _detections(index: int, t: float, boxes: Any, points: Any, scores: Any) -> D
     if len({*given, *([len(score)] if len(score) else [])}) > 1:
         got, expected = f"{len(box)} boxes, {len(pos)} points, {len(score)} scores", "as many of each"
         raise InputError(place=f"frame {index}", got=got, expected=expected, remedy="give one row for each detection")
+    if (box[:, 2:] < 0).any():
+        got, remedy = "a negative width or height", "give left, top, width, height"
+        raise InputError(place=f"frame {index}", got=got, expected="boxes of 0 px or more", remedy=remedy)
     if points is not None:
         return Detections(index, t, "ground", pos, None, None if boxes is None else box, score)
     return Detections(index, t, "image", box[:, :2] + box[:, 2:] / 2, None, box, score)

@@ -69,7 +69,7 @@ class Policy:
         for name, row in self.weights.items():
             if not kind.known(name).online:
                 expected, remedy = "a parameter that may change between frames", "remove it"
-                raise InputError(place=f"policy.{name}", got="another one", expected=expected, remedy=remedy)
+                raise InputError(place=f"policy.{name}", got=repr(name), expected=expected, remedy=remedy)
             for signal, weight in row.items():
                 if signal not in (BIAS, *NAMES):
                     got, remedy = repr(signal), did_you_mean(signal, (BIAS, *NAMES))

@@ -247,6 +247,15 @@ def params_in(kind: type[Config], source: str | Path) -> Config | Policy:
     return read_policy(kind, file_of(kind.tracker, source)) or kind.load(source)
 
 
+def check_params(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> None:
+    """Raises InputError if `params` are no parameters of a tracker that is known by its name or class."""
+    given = tracker.tracker if isinstance(tracker, TimeLimited) else tracker
+    if params is not None and isinstance(given, str | type):
+        kind: type[Config] | None = getattr(tracker_registry.find(given), "config_class", None)
+        if kind is not None and _policy(given, params) is None:
+            config_of(kind, params)
+
+
 def _policy(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> Policy | None:
     """Returns the policy that `params` are or that they name, None if they are parameters."""
     given = tracker.tracker if isinstance(tracker, TimeLimited) else tracker

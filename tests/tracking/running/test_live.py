@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -185,3 +186,20 @@ def test_a_wrong_frame_is_named(steps, words):
 def test_a_wrong_option_is_named(options):
     with pytest.raises(InputError):
         tracking.Live("blob", **options)
+
+
+def test_wrong_parameters_are_refused_at_once(tmp_path: Path) -> None:
+    """A camera would be opened first otherwise."""
+    (tmp_path / "p.toml").write_text('tracker = "blob"\n[policy.gate]\nresidul = 1.0\n')
+    for params, words in (
+        (tmp_path / "p.toml", "did you mean residual"),
+        ({"gaet": 1}, "gate"),
+        ("nofile.toml", "nofile"),
+    ):
+        with pytest.raises(InputError, match=words):
+            tracking.Live("blob", fps=10, params=params)
+
+
+def test_boxes_of_negative_size_are_refused() -> None:
+    with pytest.raises(InputError, match="negative width or height"):
+        tracking.Live("blob", fps=10, px_per_m=40).step(boxes=[[1, 2, -30, 80]])

@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 from scenarios.errors import InputError
-from tests.tuning_toys import toy_plan, tune_arguments
+from tests.processes import TOY
+from tests.tuning_toys import toy_plan, tune_arguments, write_scenes
+from tracking.app.cli import run
 from tracking.config import Config
 from tracking.parameter_space import Space
 from tracking.running.policy import Policy, read_policy
@@ -52,3 +54,11 @@ def test_what_cannot_be_adapted_is_said_before_anything_is_played(tmp_path: Path
     for more, words in (({"objective": "HOTA"}, "objective"), ({"objective": (), "adaptive": 3}, "6")):
         with pytest.raises(InputError, match=words):
             tune(**tune_arguments(tmp_path, **{"adaptive": 6, **more}))
+
+
+def test_the_command_has_the_option(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one, _ = write_scenes(tmp_path)
+    few = ["--seeds", "0:2", "--validation", "10000:10002", "--test", "20000:20001", "--check", "none"]
+    words = ["tune", TOY, "--suite", one, "--trials", "2", "--adaptive", "6", *few, "--out", str(tmp_path / "t.toml")]
+    assert run(words) == 0
+    assert "the constant stays" in capsys.readouterr().out

@@ -165,7 +165,7 @@ def _stopped_by_signals() -> Iterator[_Stop]:
 
 class _LiveRun:
     """A live run on its way to the disk. State: live; parts; latency, ms, of each of the last frames; stored, the last
-    frame that is."""
+    frame that is; said, what was said to be learned."""
 
     def __init__(self, setup: TrackerSetup, options: TrackOptions, fps: float, pictures: LivePictures | None) -> None:
         self.pictures, self.options = pictures, options
@@ -175,7 +175,7 @@ class _LiveRun:
             mask=options.mask, name="standard input" if pictures is None else hidden(options.source),
         )  # fmt: skip
         self.parts = TrackParts(options.out, fps, self.live.sequence.camera)
-        self.latency, self.stored = deque[float](maxlen=LATENCIES), 0
+        self.latency, self.stored, self.said = deque[float](maxlen=LATENCIES), 0, set[str]()
 
     def step(self, given: dict[str, Any], at: float) -> None:
         """Tracks a frame that came at a moment of the monotonic clock, and stores what is completed."""
@@ -185,8 +185,16 @@ class _LiveRun:
             good = isinstance(frame, int) and not isinstance(frame, bool) and 1 <= frame <= FRAMES
             reject(not good, "", frame, f"a frame from 1 to {FRAMES}", "count frames from 1", "frame")
             given["t"] = (frame - 1) / self.live.sequence.fps
-        self._keep(self.live.step(**given).completed)
+        now = self.live.step(**given)
+        self._say_what_is_learned(now.learns)
+        self._keep(now.completed)
         self.latency.append(1000 * (time.monotonic() - at))
+
+    def _say_what_is_learned(self, learns: str) -> None:
+        if self.options.stream and learns and learns not in self.said:
+            self.said.add(learns)
+            words = f"{self.live.sequence.name}: the {learns} is learned first; frames are printed when it is known"
+            warnings.warn(words, UserWarning, stacklevel=2)
 
     def finish(self, ended: str) -> dict[str, Any]:
         """Stores the run as a whole, and returns its row for the command's result."""
