@@ -151,7 +151,7 @@ def test_the_last_frame_can_be_given_anew(tmp_path):
     assert files(tmp_path) == whole([*tracks[:-1], last])
 
 
-def test_parts_are_written_twice_a_second(tmp_path, monkeypatch):
+def test_parts_are_written_every_quarter_of_a_second(tmp_path, monkeypatch):
     clock = [0.0]
     monkeypatch.setattr(track_parts.time, "monotonic", lambda: clock[0])
     parts = TrackParts(tmp_path, 10.0)
@@ -159,9 +159,9 @@ def test_parts_are_written_twice_a_second(tmp_path, monkeypatch):
         clock[0] = k / 10
         parts.add([t], INFO)
     assert [p.name for p in sorted((tmp_path / "parts").iterdir())] == [
-        "0000001", "0000007", "0000012", "0000017",
+        "0000001", "0000005", "0000008", "0000011", "0000014", "0000017", "0000020", "0000023",
     ]  # fmt: skip
-    assert len(read_parts(tmp_path)[0]) == 21
+    assert len(read_parts(tmp_path)[0]) == 25
 
 
 def test_a_run_in_progress_is_not_put_together(tmp_path):
