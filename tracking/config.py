@@ -216,14 +216,19 @@ def read_params(path: str | Path, tracker: str) -> dict[str, object]:
     if the file is of another tracker or has other keys."""
     content = parse(Path(path))
     name = content.pop("tracker", tracker)
-    if name != tracker:
-        remedy = "give the file to the tracker it was made for"
-        raise InputError(file=path, place="tracker", got=repr(name), expected=tracker, remedy=remedy)
+    require_tracker(name, tracker, path)
     values = content.pop("params", {})
     if content or not isinstance(values, dict):
         got, remedy = ", ".join(content) or "params", "put the parameters under [params]"
         raise InputError(file=path, got=got, expected="tracker and [params]", remedy=remedy)
     return values
+
+
+def require_tracker(name: object, tracker: str, path: str | Path) -> None:
+    """Raises InputError if `name`, in a file of parameters, is not that of the tracker."""
+    if name != tracker:
+        remedy = "give the file to the tracker it was made for"
+        raise InputError(file=path, place="tracker", got=repr(name), expected=tracker, remedy=remedy)
 
 
 def toml_text(tracker: str, values: Mapping[str, object]) -> str:

@@ -185,10 +185,11 @@ def poses_of_sample(sample: Image) -> list[Array | None] | None:
     return poses if moved >= max(LEAST_MOVED, len(sample) // 10) else None
 
 
-def seen(transform: Array, size: tuple[int, int]) -> Bools:
-    """Returns the pixels (H, W) of the reference that a picture of (width, height), laid on it, shows."""
+def seen(transform: Array, size: tuple[int, int], within: tuple[int, int] | None = None) -> Bools:
+    """Returns the pixels (H, W) of the reference that a picture of (width, height), laid on it, shows. within: width
+    and height of the reference; None: those of the picture."""
     whole = np.full(size[::-1], 255, np.uint8)
-    return np.asarray(cv2.warpPerspective(whole, transform, size, flags=cv2.INTER_LINEAR) == 255)
+    return np.asarray(cv2.warpPerspective(whole, transform, within or size, flags=cv2.INTER_LINEAR) == 255)
 
 
 @dataclass(frozen=True, eq=False)

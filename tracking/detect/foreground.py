@@ -23,6 +23,7 @@ from sim.arrays import read_only
 from sim.types import Array, Bools, Context, Detections, Image, Tracks
 from tracking.detect import blobs
 from tracking.detect.background import Background, fused_foreground
+from tracking.detect.background_kernels import Floats
 from tracking.detect.background_settings import BackgroundSettings
 from tracking.detect.background_training import check_frame
 from tracking.detect.camera_motion import (
@@ -101,7 +102,6 @@ class Foreground:
         poses = poses_of_sample(sample) if np.ndim(sample) == 4 and len(sample) > 2 else None
         size, at = (sample.shape[2], sample.shape[1]), (0, 0)
         if poses is not None:
-            first = sample[len(sample) // 2]
             sample, known, at = on_one_picture(sample, poses)
             warnings.warn(MOVES, stacklevel=2)
         self.model = Background(sample, context.fps, settings)
@@ -110,8 +110,7 @@ class Foreground:
         if poses is not None:
             self.model.valid &= known
             self.model.look_at(at, size)
-            self.stabiliser = Stabiliser(first, None, self._fps, poses)
-            self.stabiliser.look_at(self.model.picture(), self.model.valid)
+            self.stabiliser = Stabiliser(self.model.picture(), self.model.valid, self._fps, poses)
         self.ghosts = Ghosts(self.shape, self.model.noise(), context.fps) if settings.adaptive else None
 
     def follow(self, settings: BackgroundSettings) -> None:
@@ -187,19 +186,20 @@ class Foreground:
             laid = stabiliser.laid_again(image)
         fresh = laid.shown & ~self.model.valid
         if fresh.any():
-            colour = np.moveaxis(laid.image, -1, 0).astype(np.float32) / self.model.gain[:, None, None]
-            self.model.mend(fresh, colour)
+            self.model.mend(fresh, self._at_gain_1(laid.image))
         return laid
 
     def _begun_anew(self, image: Image, lost: Stabiliser) -> Laid:
         """Makes a picture that could not be laid for some time the background: who is in it comes out by moving."""
         self._step = inverse(lost.pose) @ self._step
-        colour = np.moveaxis(image, -1, 0).astype(np.float32) / self.model.gain[:, None, None]
-        self.model.begin_anew(colour)
+        self.model.begin_anew(self._at_gain_1(image))
         if self.ghosts is not None:
             self.ghosts = Ghosts(self.shape, self.model.noise(), self._fps)
         self.stabiliser = Stabiliser(self.model.picture(), self.model.valid, self._fps)
         return Laid(image, np.ones(self.shape, bool))
+
+    def _at_gain_1(self, image: Image) -> Floats:
+        return np.asarray(np.moveaxis(image, -1, 0).astype(np.float32) / self.model.gain[:, None, None])
 
     def take_step(self) -> Array | None:
         """Returns the homography (3, 3) by which the image of the model has moved since the last call; None if it has

@@ -11,7 +11,7 @@ import numpy as np
 
 from sim.types import Array, Bools, Image
 from tracking.detect.background_kernels import Floats
-from tracking.detect.camera_motion import mapped, shifted
+from tracking.detect.camera_motion import mapped, seen, shifted
 
 LARGEST = 4.0  # sides of a mosaic at most, in sides of a picture
 STRIP = 32  # rows that are filled at once
@@ -37,16 +37,15 @@ def on_one_picture(sample: Image, poses: list[Array | None]) -> tuple[Image, Boo
     """
     size = sample.shape[2], sample.shape[1]
     kept = [(picture, pose) for picture, pose in zip(sample, poses, strict=True) if pose is not None]
-    left, top, *whole = extent([pose for _, pose in kept], size)
-    at = shifted(-left, -top)
+    left, top, width, height = extent([pose for _, pose in kept], size)
+    at, whole = shifted(-left, -top), (width, height)
     laid = np.stack([cv2.warpPerspective(picture, at @ pose, whole) for picture, pose in kept]).astype(np.uint8)
-    covered = np.full(size[::-1], 255, np.uint8)
-    shown = np.stack([cv2.warpPerspective(covered, at @ pose, whole) == 255 for _, pose in kept])
+    shown = np.stack([seen(at @ pose, size, whole) for _, pose in kept])
     turns = np.arange(len(kept))[:, None, None]
     for first in range(0, whole[1], STRIP):
         rows = slice(first, first + STRIP)
-        seen = shown[:, rows]
-        order, count = np.argsort(~seen, axis=0, kind="stable"), np.maximum(seen.sum(axis=0), 1)
+        here = shown[:, rows]
+        order, count = np.argsort(~here, axis=0, kind="stable"), np.maximum(here.sum(axis=0), 1)
         chosen = np.take_along_axis(order, turns % count, axis=0)
         laid[:, rows] = np.take_along_axis(laid[:, rows], chosen[..., None], axis=0)
     return laid, np.asarray(shown.any(axis=0)), (-left, -top)

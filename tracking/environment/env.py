@@ -35,6 +35,7 @@ from tracking.episodes.episode_cache import DEFAULT_LIMIT, OpenedSource, SourceC
 from tracking.episodes.sources import Source, SourceSpec, sources
 from tracking.parameter_space import Space, decode_and_build, encode, moved, space_of
 from tracking.running.detection_mode import choose_mode
+from tracking.running.policy import require_config
 from tracking.running.prepare import Params, config_of
 from tracking.running.signals import NAMES, Signals
 from tracking.running.time_limit import TimeLimited
@@ -152,9 +153,8 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
         base = self.defaults if options.get("params") is None else config_of(self.config_class, options["params"])
         source, opened = self._open_source(options)
         rollout = None if self.decision_every is None else self._rollout(base, source)
-        if rollout is not None and not hasattr(rollout.prepared.tracker, "config"):
-            expected, remedy = "a tracker that keeps its config as `config`", "see docs/reference/environment.md"
-            raise InputError(place="decision_every", got=self.tracker.__name__, expected=expected, remedy=remedy)
+        if rollout is not None:
+            require_config(rollout.prepared.tracker, "decision_every")
         self.source, self.base = source, base
         self._clear_episode()
         self.rollout, self._signals = rollout, Signals(opened.sequence.fps)

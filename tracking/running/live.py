@@ -44,7 +44,7 @@ from tracking.grouping.grouping_choice import Grouping, default_grouping, groupi
 from tracking.running import image_scale, tracker_registry
 from tracking.running.counted_region import Mask, counted_region, detections_inside, inside_region
 from tracking.running.detection_mode import BOTH, Given, as_needed
-from tracking.running.prepare import PICTURED, Params, PreparedTracker, check_params, prepare
+from tracking.running.prepare import PICTURED, Params, PreparedTracker, prepare, resolved_params
 from tracking.running.run_info import run_info
 from tracking.running.time_limit import TimeLimited
 
@@ -160,12 +160,11 @@ class Live:
             if value is not None and not is_number(value, low, high):
                 expected = f"a number from {low:g} to {high:g}"
                 raise InputError(place=option, got=repr(value), expected=expected, remedy=f"correct {option}")
-        check_params(tracker, params)
         if isinstance(camera, str | Path):
             from tracking.recordings.calibration import read_calibration
 
             camera = read_calibration(Path(camera))
-        self.tracker, self.params, self.seed = tracker, params, seed
+        self.tracker, self.params, self.seed = tracker, resolved_params(tracker, params), seed
         self.grouping = grouping_of(grouping) if isinstance(grouping, str | Path) else grouping or default_grouping()
         self.pictures = None if background is None or isinstance(background, str) else background
         self.choice = _choice(background if isinstance(background, str) else None, fps)

@@ -32,9 +32,9 @@ import numpy as np
 
 from scenarios.errors import InputError
 from scenarios.limits import is_number
-from scenarios.loading.toml_files import did_you_mean, parse, toml_value
+from scenarios.loading.toml_files import did_you_mean, parse
 from sim.types import Array, Frame, Tracker, Tracks
-from tracking.config import Config, Param
+from tracking.config import Config, Param, require_tracker
 from tracking.parameter_space import decode, moved
 from tracking.running.signals import NAMES, Signals
 
@@ -102,18 +102,11 @@ class Policy:
 
     def to_toml(self) -> str:
         """Returns the text of a file from which `read_policy` reads an equal policy."""
-        head = [
-            f"tracker = {toml_value(self.base.tracker)}",
-            f"every = {self.every}",
-            f"memory = {self.memory}",
-            f"limit = {self.limit}",
-            "",
-        ]
-        lines = [*head, "[params]", *(f"{name} = {toml_value(value)}" for name, value in self.base.as_dict().items())]
+        tracker, *params = self.base.to_toml().splitlines()
+        lines = [tracker, f"every = {self.every}", f"memory = {self.memory}", f"limit = {self.limit}", *params]
         for name, row in self.weights.items():
-            if not row:
-                continue
-            lines += ["", f"[policy.{name}]", *(f"{signal} = {weight}" for signal, weight in row.items())]
+            if row:
+                lines += ["", f"[policy.{name}]", *(f"{signal} = {weight}" for signal, weight in row.items())]
         return "\n".join([*lines, ""])
 
 
@@ -126,12 +119,10 @@ def read_policy(kind: type[Config], path: str | Path) -> Policy | None:
     name, rows = content.pop("tracker", kind.tracker), content.pop("policy")
     every, memory, limit = content.pop("every", 1.0), content.pop("memory", 0.0), content.pop("limit", 1.0)
     values = content.pop("params", {})
-    if name != kind.tracker:
-        remedy = "give the file to the tracker it was made for"
-        raise InputError(file=path, place="tracker", got=repr(name), expected=kind.tracker, remedy=remedy)
+    require_tracker(name, kind.tracker, path)
     tables = (values, rows, *(rows.values() if isinstance(rows, dict) else ()))
     if content or not all(isinstance(table, dict) for table in tables):
-        got, remedy = ", ".join(content) or "policy", "see tracking/running/policy.py"
+        got, remedy = ", ".join(content) or "policy", "see docs/reference/tuning.md"
         raise InputError(
             file=path, got=got, expected="tracker, every, memory, limit, [params], [policy.…]", remedy=remedy
         )
@@ -141,10 +132,17 @@ def read_policy(kind: type[Config], path: str | Path) -> Policy | None:
         raise (error if error.file else error.replaced(file=path)) from None
 
 
+def require_config(tracker: Tracker, place: str) -> None:
+    """Raises InputError, about `place`, if a tracker keeps no config that could be replaced between two frames."""
+    if not hasattr(tracker, "config"):
+        expected, remedy = "a tracker that keeps its config as `config`", "see docs/reference/environment.md"
+        raise InputError(place=place, got=type(tracker).__name__, expected=expected, remedy=remedy)
+
+
 @dataclass(eq=False)
 class FollowedPolicy:
     """A policy on a run. State: signals, of the frames since the last decision; seen, their averages (K,), None before
-    the first; frames, since the last decision."""
+    the first; frames, since the run began."""
 
     policy: Policy
     fps: float
@@ -155,10 +153,7 @@ class FollowedPolicy:
 
     def begin(self, tracker: Tracker) -> None:
         """Begins a run of a tracker. Raises InputError if it keeps no config that could be changed."""
-        if not hasattr(tracker, "config"):
-            got, expected = type(tracker).__name__, "a tracker that keeps its config as `config`"
-            remedy = "see docs/reference/environment.md"
-            raise InputError(place="policy", got=got, expected=expected, remedy=remedy)
+        require_config(tracker, "policy")
         self.signals, self.seen, self.frames = Signals(self.fps), None, 0
 
     @property
@@ -171,7 +166,7 @@ class FollowedPolicy:
         an error of the policy."""
         if self.frames % self.steps == 0:
             new = self.signals.statistics(self.px_per_m).astype(float)
-            self.seen = averaged(self.seen if self.frames else None, new, self.policy)
+            self.seen = averaged(self.seen, new, self.policy)
             config: Any = self.policy.config(self.seen)
             here: Any = tracker
             if here.config != config:

@@ -207,7 +207,8 @@ def prepare(
     if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or not 0 <= seed <= INTEGER:
         expected, remedy = f"a whole number from 0 to {INTEGER}", "give a smaller one, such as 0"
         raise InputError(place="--seed", got=repr(seed), expected=expected, remedy=remedy)
-    policy = _policy(tracker, params)
+    params = resolved_params(tracker, params)
+    policy = params if isinstance(params, Policy) else None
     name, instance, config = _make(tracker, params if policy is None else policy.base)
     mode = choose_mode(instance.needs, sequence, detections)
     if sensor and mode != "truth":
@@ -247,22 +248,16 @@ def params_in(kind: type[Config], source: str | Path) -> Config | Policy:
     return read_policy(kind, file_of(kind.tracker, source)) or kind.load(source)
 
 
-def check_params(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> None:
-    """Raises InputError if `params` are no parameters of a tracker that is known by its name or class."""
+def resolved_params(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> Params:
+    """Returns the policy or the config that `params` stand for; what they are if the tracker has no parameters, or is
+    an instance. Raises InputError if they are wrong."""
     given = tracker.tracker if isinstance(tracker, TimeLimited) else tracker
-    if params is not None and isinstance(given, str | type):
-        kind: type[Config] | None = getattr(tracker_registry.find(given), "config_class", None)
-        if kind is not None and _policy(given, params) is None:
-            config_of(kind, params)
-
-
-def _policy(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> Policy | None:
-    """Returns the policy that `params` are or that they name, None if they are parameters."""
-    given = tracker.tracker if isinstance(tracker, TimeLimited) else tracker
-    if isinstance(params, str | Path) and isinstance(given, str | type):
-        kind: type[Config] | None = getattr(tracker_registry.find(given), "config_class", None)
-        params = None if kind is None else params_in(kind, params)
-    return params if isinstance(params, Policy) else None
+    if params is None or isinstance(params, Policy) or not isinstance(given, str | type):
+        return params
+    kind: type[Config] | None = getattr(tracker_registry.find(given), "config_class", None)
+    if kind is None:
+        return params
+    return params_in(kind, params) if isinstance(params, str | Path) else config_of(kind, params)
 
 
 def _make(tracker: str | type[Tracker] | Tracker | TimeLimited, params: Params) -> tuple[str, Tracker, Config | None]:

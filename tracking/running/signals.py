@@ -80,7 +80,7 @@ class Signals:
     def _clear(self) -> None:
         self._tracks = list[Tracks]()
         self._count, self._scores = list[int](), list[Array]()
-        self._pictures = self._belong = self._have = self._of = self._born = self._died = self._brief = 0
+        self._pictures = self._belong = self._of = self._born = self._died = self._brief = 0
         self._moved, self._coasting = 0, list[float]()
         self._gaps, self._residuals, self._nis, self._shifts = (list[float]() for _ in range(4))
 
@@ -121,7 +121,6 @@ class Signals:
         far = np.hypot(off[..., 0], off[..., 1])
         row, column = _mutual(far)
         self._belong += len(row)
-        self._have += len(row)
         for id in last.id[column].tolist():
             if id in self._found:
                 self._found[id] = now
@@ -159,7 +158,7 @@ class Signals:
             values["associated"] = self._belong / total
             values["extra"] = (total - self._belong) / some
         if self._of:
-            values["found"] = self._have / self._of
+            values["found"] = self._belong / self._of
         for name, squares in (("residual", self._residuals), ("shift", self._shifts)):
             if squares:
                 values[name] = float(np.sqrt(np.mean(squares)))

@@ -24,7 +24,7 @@ import numpy as np
 from sim.types import Array
 from tracking.config import Config
 from tracking.environment.env import TuningEnv
-from tracking.parameter_space import Space, decode, moved
+from tracking.parameter_space import Space
 from tracking.running.policy import BIAS, Policy, averaged
 from tracking.running.signals import NAMES
 
@@ -129,8 +129,7 @@ def searched_policy(
     constants, most = list(pool), mean_objective(pool[0])
     for again in (0, configs // 2):
         report(f"policy: {again} configs round the best")
-        here = best
-        pool += [play(here, offset) for offset in drawn_residuals(space, again + 1, random)[1:]]
+        pool += [play(best, offset) for offset in drawn_residuals(space, again + 1, random)[1:]]
         for fit in FITS:
             report("policy: fits")
             made = fitted_policy(base, space, pool, *fit)
@@ -143,8 +142,3 @@ def searched_policy(
 def mean_objective(played: Sequence[Played]) -> float:
     """Returns the mean of the objectives that are known."""
     return float(np.nanmean([one.objective for one in played]))
-
-
-def constant(base: Config, space: Space, residual: Array) -> Config:
-    """Returns the config at a residual (P,) from `base`."""
-    return decode(space, moved(space, residual, base), base)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
-from scenarios.errors import FlockscopeError, InputError, OrderError, WorkError, counted
+from scenarios.errors import FlockscopeError, InputError, counted
 from sim.types import Array, DetectionMode
 from sim.workers.calls import RunItems
 from tracking.config import Config
 from tracking.episodes.episode import Episode, Source
 from tracking.episodes.parallel_episodes import (
-    EpisodeOrError,
     EpisodeTask,
     opened_sources,
     play_task,
@@ -34,13 +34,17 @@ class WindowsTask:
     tracker: TunedTracker
     source: Source
     policy: Policy
-    offset: Array | None
+    offset: Array
     detections: DetectionMode
     similarity: Similarity | None
 
 
-def play_windows(task: WindowsTask) -> Played | FlockscopeError | None:
-    """Plays an episode; None if the scene's script does not come true."""
+R = TypeVar("R")
+Task = TypeVar("Task", WindowsTask, EpisodeTask)
+
+
+def play_windows(task: WindowsTask) -> Played | FlockscopeError:
+    """Plays an episode, and returns it or the error that it caused."""
     from tracking.environment.env import TuningEnv
 
     cache = opened_sources()
@@ -52,8 +56,6 @@ def play_windows(task: WindowsTask) -> Played | FlockscopeError | None:
             decision_every=max(round(task.policy.every * fps), 1), cache=cache, tracker_seed=task.source.seed,
         )  # fmt: skip
         return play_policy(env, task.policy, task.offset)
-    except OrderError:
-        return None
     except FlockscopeError as error:
         return error
 
@@ -82,26 +84,34 @@ def online_space(plan: SearchPlan) -> Space:
     return found
 
 
-def adapted(plan: SearchPlan, config: Config, configs: int, report: Callable[[str], None]) -> Adapted:
-    """Returns a policy that begins with `config`, if it is surely better on the validation scenes. configs: number of
-    constant configs to play, of which it is learned."""
+def adapted(
+    plan: SearchPlan, config: Config, training: Sequence[Source], configs: int, report: Callable[[str], None]
+) -> Adapted:
+    """Returns a policy that begins with `config`, if it is surely better on the validation scenes.
+
+    training: scenes of the plan whose script comes true. configs: number of constant configs to play on them, of which
+    it is learned.
+    """
     space = online_space(plan)
+    if not training:
+        return Adapted(None, (), "the constant stays: no training scene can be played")
+    given = plan.detections, plan.options.similarity
     with playing_workers(plan.options.workers, plan.options.cluster) as run:
-        first = _windows(run, plan, plan.training, still(config), None)
-        known = [source for source, one in zip(plan.training, first, strict=True) if one is not None]
-        if not known:
-            return Adapted(None, (), "the constant stays: no training scene can be played")
 
         def play(policy: Policy, offset: Array) -> list[Played]:
-            return [one for one in _windows(run, plan, known, policy, offset) if one is not None]
+            return _played(run, play_windows, [WindowsTask(plan.tracker, s, policy, offset, *given) for s in training])
+
+        def episodes(sources: Sequence[Source], policy: Policy) -> list[Episode]:
+            more = plan.detections, False, plan.options.similarity, policy
+            return _played(run, play_task, [EpisodeTask(plan.tracker, s, {}, *more) for s in sources])
 
         best, _ = searched_policy(play, config, space, configs, plan.options.seed, report)
         if not any(best.weights.values()):
             return Adapted(None, (), "the constant stays: no policy is better in training")
         report("policy: validation")
-        goal, comparisons = plan.goals[0], list[Comparison]()
+        goal, comparisons, still = plan.goals[0], list[Comparison](), Policy(config, EVERY, MEMORY, {})
         for name, sources in {"validation": plan.validation, **plan.tests}.items():
-            before, after = (list(_episodes(run, plan, sources, one)) for one in (still(config), best))
+            before, after = (episodes(sources, one) for one in (still, best))
             found = compare_episodes(name, goal, before, after)
             comparisons += [] if found is None else [found]
             if name == "validation" and (found is None or found.verdict != "better"):
@@ -110,40 +120,13 @@ def adapted(plan: SearchPlan, config: Config, configs: int, report: Callable[[st
     return Adapted(best, tuple(comparisons), "the policy is kept: surely better than the constant in validation")
 
 
-def still(config: Config) -> Policy:
-    """Returns the policy that keeps a config."""
-    return Policy(config, EVERY, MEMORY, {})
-
-
-def _windows(
-    run: RunItems, plan: SearchPlan, sources: Sequence[Source], policy: Policy, offset: Array | None
-) -> list[Played | None]:
+def _played(run: RunItems, function: Callable[[Task], R | FlockscopeError], tasks: Sequence[Task]) -> list[R]:
+    """Returns what the function makes of the tasks, in their order. Raises the first error."""
     from sim.workers.start import results_in_order
 
-    given = (policy, offset, plan.detections, plan.options.similarity)
-    tasks = [WindowsTask(plan.tracker, source, *given) for source in sources]
-    found = list[Played | None]()
-    for result in results_in_order(run, play_windows, tasks, _lost):
+    found = list[R]()
+    for result in results_in_order(run, function, tasks, lambda task, error: error.replaced(file=task.tracker.name)):
         if isinstance(result, FlockscopeError):
             raise result
         found.append(result)
     return found
-
-
-def _episodes(run: RunItems, plan: SearchPlan, sources: Sequence[Source], policy: Policy) -> Iterator[Episode]:
-    from sim.workers.start import results_in_order
-
-    more = (plan.detections, False, plan.options.similarity, policy)
-    tasks = [EpisodeTask(plan.tracker, source, {}, *more) for source in sources]
-    for result in results_in_order(run, play_task, tasks, _lost_episode):
-        if isinstance(result, FlockscopeError):
-            raise result
-        yield result
-
-
-def _lost(task: WindowsTask, error: WorkError) -> Played | FlockscopeError | None:
-    return error.replaced(file=task.tracker.name)
-
-
-def _lost_episode(task: EpisodeTask, error: WorkError) -> EpisodeOrError:
-    return error.replaced(file=task.tracker.name)

@@ -83,10 +83,12 @@ def _search(options: TuneOptions) -> TuningResult:
         run_trials(study, play, progress)
         report = partial(progress, options.trials, options.trials)
         evaluator = HeldOutEvaluator(plan, play, study.optuna, report)
-        evaluator.count(plan.training, study.left_out())
+        left_out = study.left_out()
+        evaluator.count(plan.training, left_out)
         found = replace(_evaluated(plan, study, evaluator), taken_over=taken_over)
     if options.adaptive is not None:
-        found = replace(found, adapted=adapted(plan, found.config, options.adaptive, report))
+        training = [source for source, why in zip(plan.training, left_out, strict=True) if not why]
+        found = replace(found, adapted=adapted(plan, found.config, training, options.adaptive, report))
     if target is not None:
         found.write(target)
     evaluator.require_most()

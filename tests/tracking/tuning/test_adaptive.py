@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tracking.config import Config
 from tracking.papers.blob.config import BlobConfig
-from tracking.parameter_space import encode, space_of
+from tracking.parameter_space import decode, encode, moved, space_of
 from tracking.running.signals import NAMES
-from tracking.tuning.adaptive import Played, constant, drawn_residuals, fitted_policy
+from tracking.tuning.adaptive import Played, drawn_residuals, fitted_policy
 
 SPACE = tuple(
     p for p in space_of(BlobConfig, "file", online=True) if p.name in ("gate", "position_noise", "size_noise")
@@ -71,5 +72,9 @@ def test_residuals_begin_with_none_and_stay_in_range() -> None:
 
 def test_constants() -> None:
     base = BlobConfig(gate=0.9)
-    assert constant(base, SPACE, np.zeros(3)) == base
-    assert encode(SPACE, constant(base, SPACE, np.array([1.0, -1.0, 1.0]))) == pytest.approx([1, -1, 1])
+
+    def constant(residual: np.ndarray) -> Config:
+        return decode(SPACE, moved(SPACE, residual, base), base)
+
+    assert constant(np.zeros(3)) == base
+    assert encode(SPACE, constant(np.array([1.0, -1.0, 1.0]))) == pytest.approx([1, -1, 1])

@@ -40,7 +40,7 @@ def test_a_policy_that_surely_helps_is_kept(tmp_path: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(adaptive, "fitted_policy", longer)
     plan = toy_plan(tmp_path, objective=(), adaptive=6)
-    found = adapted(plan, plan.base, 6, quiet)
+    found = adapted(plan, plan.base, plan.training, 6, quiet)
     assert found.policy is not None
     assert [c.scenes for c in found.comparisons] == ["validation", "one.toml", "two.toml"]
     assert all(c.verdict == "better" for c in found.comparisons)
