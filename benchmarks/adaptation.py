@@ -1,32 +1,42 @@
 """Does it pay to change a tracker's parameters while it runs?
 
-    python -m benchmarks adaptation [TRACKER …] [--configs 30] [--train 0:2] [--seeds 20000:20004] [--out FIGURE.svg]
+    python -m benchmarks adaptation [TRACKER …] [--configs 24] [--train 0:2] [--seeds 20000:20003]
+        [--environments DIR] [--chart FILE.svg] [--out FIGURE.svg]
 
-Trackers are played on the suite `drift`, whose detector changes twice within a minute. Configs are drawn round the
-defaults, and each plays all training scenes as a constant; everything below is chosen or fitted by these. Objective
-(mean of HOTA and group_F1) on the test seeds of `drift`, of `drift-other`, which has changes of other kinds, and of
-`standard`, where nothing changes; differences from the best constant, paired by scene, with 95 % intervals:
+Trackers are played on the suite `drift`, whose detector changes twice within a minute, and on `quick`, where nothing
+changes. All searches play these training scenes equally often, each time with one set of parameters, and choose what
+has the best mean objective (mean of HOTA and group_F1). Then on the test seeds of `drift`, of `drift-other`, which has
+changes of other kinds, and of `standard`, where nothing changes; differences from the best constant, paired by scene,
+with 95 % intervals:
 
-defaults         the tracker's own
-best constant    the config that is best in training
-hindsight        for each part of each entry of `drift` the config that was best there in training; it is told when
-                 the parts begin, which no tracker knows: what could be gained
-rule             three lines: the noise of positions follows the residuals, the probability of detection the share of
-                 tracks that are found, false alarms the detections that belong to no track
-policy           linear, from a response surface (`tracking.tuning.adaptive`), as `tune --adaptive` finds it
---out: what the policy does in the first test episode, as a picture.
+defaults           the tracker's own
+random, TPE, CMA   constants drawn round the defaults, by Optuna's TPE and by its CMA-ES; the best in training of all
+                   three is the best constant
+hindsight          for each part of each entry of `drift` the constant that was best there in training; it is told when
+                   the parts begin, which no tracker knows: what could be gained
+rule               three lines: the noise of positions follows the residuals, the probability of detection the share of
+                   tracks that are found, false alarms the detections that belong to no track
+linear by CMA      residuals linear in four statistics, whose weights Optuna's CMA-ES searches
+policy             linear, from a response surface (`tracking.tuning.adaptive`), as `tune --adaptive` finds it
+
+SORT and ByteTrack are those of roboflow `trackers` (benchmarks/peers). --chart: the best training value over the
+searches; --out: what the policy does in the first test episode. Each of the first tracker.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from benchmarks.support.options import add_seeds, new_parser
+from benchmarks.peers.adapters import PEERS, ByteTrackConfig, SortConfig
+from benchmarks.peers.environments import DEFAULT, make_environments
+from benchmarks.support import chart
+from benchmarks.support.options import add_seeds, new_parser, one_thread
 from benchmarks.support.tables import difference_cell, head, mean_cell, row
 from scenarios.errors import OrderError
 from scenarios.schema.schedule import Schedule
@@ -37,7 +47,7 @@ from tracking.environment.env import TuningEnv
 from tracking.episodes.episode_cache import SourceCache
 from tracking.episodes.sources import Source, sources
 from tracking.parameter_space import space_of
-from tracking.running.policy import Policy
+from tracking.running.policy import BIAS, Policy
 from tracking.running.signals import NAMES
 from tracking.running.tracker_registry import config_class, find
 from tracking.tuning.adaptive import (
@@ -50,10 +60,13 @@ from tracking.tuning.adaptive import (
     searched_policy,
 )
 
-TRACKERS = "blob", "group-pda"
-SUITES = "drift", "drift-other", "standard"
-LIMIT, SEED = 0.4, 0  # of the rule; of the search
+TRACKERS = "blob", "group-pda", "SORT", "ByteTrack"
+TRAINING, SUITES = ("drift", "quick"), ("drift",)
+LIMIT, SEED = 0.4, 0  # of the rule; of the searches
 SCENES = 2**31  # bytes of scenes that are kept
+SPREAD = 0.3  # standard deviation with which CMA-ES begins; of a linear policy, for statistics of unit variance
+TOLD = ("observed", "found", "extra", "residual")  # statistics of the linear policy that CMA-ES searches
+MARKS = (1, 8, 16, 24, 32, 44)  # rounds of a search that are printed
 # the parameters that are searched: those of detections, motion and existence
 SEARCHED = {
     "blob": (
@@ -64,9 +77,8 @@ SEARCHED = {
         "gate", "radius", "accel_noise", "point_noise", "confirm_time", "coast_time", "report_coast", "carry_time",
         "carry_reach",
     ),
-    "relational": (
-        "noise_scale", "point_noise", "outlier_share", "detect_prob", "hidden_time", "clutter_density", "birth_rate",
-    ),
+    "SORT": tuple(SortConfig.params()),
+    "ByteTrack": tuple(ByteTrackConfig.params()),
 }  # fmt: skip
 RULES = {
     "blob": {
@@ -77,9 +89,13 @@ RULES = {
         "point_noise": {"residual": 1.0, "bias": -0.45}, "coast_time": {"found": -0.5, "bias": 0.45},
         "confirm_time": {"extra": 0.6, "bias": -0.15},
     },
-    "relational": {
-        "point_noise": {"residual": 1.0, "bias": -0.45}, "detect_prob": {"found": 0.8, "bias": -0.75},
-        "clutter_density": {"extra": 0.8, "bias": -0.2},
+    "SORT": {
+        "minimum_iou_threshold": {"residual": -1.0, "bias": 0.45}, "lost_track_buffer": {"found": -0.5, "bias": 0.45},
+        "minimum_consecutive_frames": {"extra": 0.6, "bias": -0.15},
+    },
+    "ByteTrack": {
+        "minimum_iou_threshold": {"residual": -1.0, "bias": 0.45}, "lost_track_buffer": {"found": -0.5, "bias": 0.45},
+        "minimum_consecutive_frames": {"extra": 0.6, "bias": -0.15},
     },
 }  # fmt: skip
 
@@ -117,10 +133,10 @@ def schedules(table: Model) -> list[Schedule[float]]:
 class Bench:
     """One tracker: plays its episodes. State: the scenes that are kept."""
 
-    def __init__(self, tracker: str) -> None:
-        self.tracker, self.cache = tracker, SourceCache(SCENES)
-        kind = config_class(find(tracker), tracker)
-        self.space = tuple(p for p in space_of(kind, "file", online=True) if p.name in SEARCHED[tracker])
+    def __init__(self, name: str) -> None:
+        self.tracker, self.cache = find(PEERS[name][1] if name in PEERS else name), SourceCache(SCENES)
+        kind = config_class(self.tracker, name)
+        self.space = tuple(p for p in space_of(kind, "file", online=True) if p.name in SEARCHED[name])
         self.base = kind()
         self.still = Policy(self.base, EVERY, MEMORY, {p.name: {} for p in self.space})
 
@@ -161,44 +177,120 @@ def playable(bench: Bench, found: Sequence[Scene]) -> list[Scene]:
     return kept
 
 
-def adaptation(tracker: str, configs: int, train: range, seeds: range, out: Path | None) -> None:
+class Search:
+    """Plays sets of parameters on all training scenes. State: `best`, the best mean objective after each round."""
+
+    def __init__(self, bench: Bench, training: Sequence[Scene]) -> None:
+        self.bench, self.training, self.best = bench, training, list[float]()
+
+    def play(self, policy: Policy, offset: Array) -> list[Played]:
+        """Returns what a policy plays; offset (P,): is added to its residuals."""
+        found = [self.bench.play(scene, policy, offset) for scene in self.training]
+        self.best.append(max([mean_objective(found), *self.best[-1:]]))
+        return found
+
+
+def by_optuna(search: Search, sampler: Any, rounds: int, size: int, made: Callable[[Array], Any]) -> list[Any]:
+    """Returns what is made of each of `rounds` vectors (size,) in [-1, 1], 0 first, that a sampler of Optuna asks for,
+    and what it plays; made(vector): a policy and its offset."""
+    import optuna
+
+    optuna.logging.set_verbosity(optuna.logging.ERROR)
+    study = optuna.create_study(direction="maximize", sampler=sampler)
+    names = [f"x{k}" for k in range(size)]
+    study.enqueue_trial(dict.fromkeys(names, 0.0))
+    found = []
+    for _ in range(rounds):
+        trial = study.ask()
+        given = made(np.array([trial.suggest_float(name, -1.0, 1.0) for name in names]))
+        played = search.play(*given)
+        study.tell(trial, mean_objective(played))
+        found.append((given, played))
+    return found
+
+
+def cma(size: int) -> Any:
+    """Returns Optuna's CMA-ES that begins at 0."""
+    from optuna.samplers import CmaEsSampler
+
+    return CmaEsSampler(
+        x0={f"x{k}": 0.0 for k in range(size)}, sigma0=SPREAD, seed=SEED, warn_independent_sampling=False
+    )
+
+
+def linear(bench: Bench, mean: Array, sd: Array) -> Callable[[Array], tuple[Policy, Array]]:
+    """Returns what makes a policy of weights (P (1 + S),), each of a standardised statistic of TOLD; mean, sd (S,)."""
+    still = np.zeros(len(bench.space))
+
+    def made(vector: Array) -> tuple[Policy, Array]:
+        rows = {}
+        for p, (first, *others) in zip(bench.space, vector.reshape(len(bench.space), -1), strict=True):
+            weights = {name: float(w / d) for name, w, d in zip(TOLD, others, sd, strict=True)}
+            bias = first - sum(w * m for w, m in zip(weights.values(), mean, strict=True))
+            rows[p.name] = {BIAS: float(bias), **weights}
+        return Policy(bench.base, EVERY, MEMORY, rows, LIMIT), still
+
+    return made
+
+
+def adaptation(name: str, configs: int, train: range, seeds: range, picture: Path | None, curve: Path | None) -> None:
     """Prints the tables of one tracker."""
-    bench = Bench(tracker)
-    training = playable(bench, scenes("drift", train))
-    residuals = drawn_residuals(bench.space, configs, np.random.default_rng(SEED))
+    from optuna.samplers import TPESampler
 
-    def play(policy: Policy, offset: Array) -> list[Played]:
-        return [bench.play(scene, policy, offset) for scene in training]
-
-    policy, pool = searched_policy(play, bench.base, bench.space, configs, SEED, lambda text: None)
-    best = int(np.argmax([mean_objective(each) for each in pool]))
-    parts = best_by_part(training, pool)
-    rule = Policy(bench.base, EVERY, MEMORY, RULES[tracker], LIMIT)
-    print(f"\n{tracker}: {configs} configs, {len(training)} training scenes", flush=True)
-    print(policy.to_toml())
+    bench = Bench(name)
+    drifting, *others = (playable(bench, scenes(suite, train)) for suite in TRAINING)
+    training = [*drifting, *(scene for each in others for scene in each)]
+    size, still = len(bench.space), np.zeros(len(bench.space))
+    searches = {key: Search(bench, training) for key in ("random", "TPE", "CMA", "linear by CMA", "policy")}
+    policy, _ = searched_policy(searches["policy"].play, bench.base, bench.space, configs, SEED, lambda text: None)
+    rounds = len(searches["policy"].best)
+    drawn = drawn_residuals(bench.space, rounds, np.random.default_rng(SEED))
+    pools = {
+        "random": [((bench.still, each), searches["random"].play(bench.still, each)) for each in drawn],
+        "TPE": by_optuna(searches["TPE"], TPESampler(seed=SEED), rounds, size, lambda x: (bench.still, x)),
+        "CMA": by_optuna(searches["CMA"], cma(size), rounds, size, lambda x: (bench.still, x)),
+    }
+    seen = np.concatenate([one.seen[:-1] for one in pools["random"][0][1]])[:, [NAMES.index(each) for each in TOLD]]
+    weighted = linear(bench, seen.mean(axis=0), np.maximum(seen.std(axis=0), 0.01))
+    dimensions = size * (1 + len(TOLD))
+    lines = by_optuna(searches["linear by CMA"], cma(dimensions), rounds, dimensions, weighted)
+    best = {key: max(pool, key=lambda one: mean_objective(one[1])) for key, pool in {**pools, "lines": lines}.items()}
+    constant = max(pools, key=lambda key: mean_objective(best[key][1]))
+    every = [one for pool in pools.values() for one in pool]
+    parts = best_by_part(drifting, [played[: len(drifting)] for _, played in every])
+    residuals = np.array([offset for (_, offset), _ in every])
+    rule = Policy(bench.base, EVERY, MEMORY, RULES[name], LIMIT)
+    known = {
+        "defaults": (bench.still, still), **{key: best[key][0] for key in pools}, "rule": (rule, still),
+        "linear by CMA": best["lines"][0], "policy": (policy, still),
+    }  # fmt: skip
+    print(f"\n{name}: {rounds} rounds of {len(training)} training scenes; the best constant is that of {constant}")
+    head(["search", *(f"{k} rounds" for k in MARKS if k <= rounds)])
+    for key, search in searches.items():
+        row([key, *(f"{search.best[k - 1]:.3f}" for k in MARKS if k <= rounds)])
+    print(f"\n{policy.to_toml()}", flush=True)
+    if curve is not None:
+        x = list(range(1, rounds + 1))
+        panel = chart.Panel(f"{name}, training scenes", x, {key: s.best for key, s in searches.items()}, "rounds")
+        chart.lines([panel], curve)
     for suite in SUITES:
         test = playable(bench, scenes(suite, seeds))
-        found = {
-            "defaults": [bench.play(s, bench.still).objective for s in test],
-            "best constant": [bench.play(s, bench.still, residuals[best]).objective for s in test],
-        }
+        found = {key: [bench.play(s, *given).objective for s in test] for key, given in known.items()}
         if suite == "drift":
             found["hindsight"] = [bench.told(s, residuals, parts) for s in test]
-        found["rule"] = [bench.play(s, rule).objective for s in test]
-        found["policy"] = [bench.play(s, policy).objective for s in test]
-        known = np.isfinite(list(found.values())).all(axis=0)
-        print(f"\n{tracker}, {suite}: {known.sum()} scenes", flush=True)
+        settled = np.isfinite(list(found.values())).all(axis=0)
+        print(f"\n{name}, {suite}: {settled.sum()} scenes", flush=True)
         head(["parameters", "objective", "beside the best constant"])
-        for name, values in found.items():
-            gain = np.array(values)[known] - np.array(found["best constant"])[known]
-            row([name, mean_cell(np.array(values)[known]), difference_cell(gain) if name != "best constant" else "–"])
+        for key, values in found.items():
+            gain = np.array(values)[settled] - np.array(found[constant])[settled]
+            row([key, mean_cell(np.array(values)[settled]), difference_cell(gain) if key != constant else "–"])
         if suite == "drift":
             head(["entry", *found])
-            for name in dict.fromkeys(s.source.name for s in test):
-                mine = [k for k, s in enumerate(test) if s.source.name == name]
-                row([name, *(f"{np.mean([values[k] for k in mine]):.3f}" for values in found.values())])
-        if suite == "drift" and out is not None:
-            draw(bench, test[0], policy, out)
+            for entry in dict.fromkeys(s.source.name for s in test):
+                mine = [k for k, s in enumerate(test) if s.source.name == entry]
+                row([entry, *(f"{np.mean([values[k] for k in mine]):.3f}" for values in found.values())])
+        if suite == "drift" and picture is not None:
+            draw(bench, test[0], policy, picture)
 
 
 def best_by_part(training: Sequence[Scene], pool: Sequence[Sequence[Played]]) -> dict[tuple[str, int], int]:
@@ -243,14 +335,19 @@ def draw(bench: Bench, scene: Scene, policy: Policy, out: Path) -> None:
 def main() -> None:
     parser = new_parser(__doc__)
     parser.add_argument("trackers", nargs="*", default=TRACKERS, choices=SEARCHED)
-    parser.add_argument("--configs", type=int, default=30)
+    parser.add_argument("--configs", type=int, default=24, help="constants that a policy is learned from")
     add_seeds(parser, "0:2", "--train", "of training: ")
-    add_seeds(parser, "20000:20004", what="of test: ")
-    parser.add_argument("--out", type=Path, help="picture of the first tracker's first test episode")
+    add_seeds(parser, "20000:20003", what="of test: ")
+    parser.add_argument("--environments", type=Path, default=DEFAULT, metavar="DIR", help="folder of the libraries")
+    parser.add_argument("--chart", type=Path, help="picture of the searches")
+    parser.add_argument("--out", type=Path, help="picture of what the policy does")
     given = parser.parse_args()
     warnings.simplefilter("ignore")
+    one_thread()
+    make_environments(given.environments, ("cmaes", "roboflow"))
     for k, tracker in enumerate(given.trackers):
-        adaptation(tracker, given.configs, given.train, given.seeds, given.out if k == 0 else None)
+        pictures = (given.out, given.chart) if k == 0 else (None, None)
+        adaptation(tracker, given.configs, given.train, given.seeds, *pictures)
 
 
 if __name__ == "__main__":

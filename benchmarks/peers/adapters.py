@@ -45,8 +45,14 @@ def box_of(corners: Any) -> Array:
     return np.c_[corners[:, :2], corners[:, 2:] - corners[:, :2]]
 
 
+KEPT = "tracks", "frame_count", "_next_track_id", "_last_timestamp"  # what a tracker of theirs knows of earlier frames
+
+
 class Roboflow:
-    """A tracker of roboflow `trackers`. State: `tracker`, theirs."""
+    """A tracker of roboflow `trackers`. State: `tracker`, theirs; `used`, the config that it was made with.
+
+    `config` may be replaced between two frames: a new tracker then goes on with the tracks of the old one.
+    """
 
     needs = ("boxes",)
     kind: ClassVar[str]
@@ -57,14 +63,21 @@ class Roboflow:
 
     def reset(self, context: Context, seed: int) -> None:
         """Makes a new tracker of theirs."""
+        self.fps, self.used, self.tracker = context.fps, self.config, self._made(context.fps)
+
+    def _made(self, fps: float) -> Any:
         import trackers
 
-        self.tracker = getattr(trackers, self.kind)(**self.config.as_dict(), **self.fixed, frame_rate=context.fps)
+        return getattr(trackers, self.kind)(**self.config.as_dict(), **self.fixed, frame_rate=fps)
 
     def step(self, frame: Frame, detections: Detections) -> Tracks:
         """Returns the detections to which their tracker gives an id."""
         import supervision
 
+        if self.config is not self.used:
+            new, old = self._made(self.fps), vars(self.tracker)
+            vars(new).update({name: old[name] for name in KEPT if name in old})
+            self.used, self.tracker = self.config, new
         corners = corners_of(detections.box)
         given = supervision.Detections(
             xyxy=corners, confidence=detections.score.copy(), class_id=np.zeros(len(corners), int)

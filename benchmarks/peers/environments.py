@@ -9,6 +9,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterable
 from importlib.metadata import distributions
 from pathlib import Path
 
@@ -17,18 +18,21 @@ PACKAGES = {
     "roboflow": ("trackers", "supervision", "pydeprecate", "pyyaml", "defusedxml", "tqdm", "requests", "urllib3",
                  "idna", "certifi", "charset-normalizer"),
     "norfair": ("norfair",),
+    "cmaes": ("cmaes",),
     "stonesoup": ("stonesoup", "ordered-set", "rtree", "ruamel.yaml", "pymap3d", "utm"),
 }  # fmt: skip
+OF_TRACKERS = "roboflow", "norfair", "stonesoup"
 DEFAULT = Path.home() / ".cache" / "flockscope" / "peers"
 
 
-def make_environments(folder: Path) -> dict[str, str]:
+def make_environments(folder: Path, libraries: Iterable[str] = OF_TRACKERS) -> dict[str, str]:
     """Installs what is not there yet and puts it at the end of the search path of modules.
 
     Returns the name and version of each library, "" for one that pip cannot install; pip's reason goes to stderr.
     """
     found = {}
-    for library, packages in PACKAGES.items():
+    for library in libraries:
+        packages = PACKAGES[library]
         place = folder / library
         if not place.is_dir():
             made = folder / f"{library}.unfinished"

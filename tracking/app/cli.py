@@ -10,6 +10,7 @@ from typing import Annotated
 
 import typer
 
+from tracking.app import fit_options
 from tracking.app.command_line import add_command, run_command
 from tracking.app.command_options import COMMANDS
 from tracking.app.command_result import INTERRUPTED
@@ -17,7 +18,7 @@ from tracking.app.watched_process import user_trackers, watched
 
 GROUPS = {
     "export": "Convert a dataset, or tracks, to another format.",
-    "fit": "Fit a model to recordings or simulated scenes.",
+    "fit": fit_options.ABOUT,
 }
 
 app = typer.Typer(

@@ -296,7 +296,9 @@ class TuneCommandOptions(WorkerOptions, words="tune"):
     """Search a tracker's parameters on simulated scenes; measure the gain on others."""
 
     tracker: str = tuned("tracker", flag="")
-    suite: list[str] = tuned("suite")
+    suite: list[str] = tuned("suite", [])
+    like: Path | None = option(
+        "Recording with a detector's boxes, whose labels are not read: tune on scenes like it.", None, metavar="SOURCE")
     trials: int = tuned("trials", MISSING)
     seeds: str | None = tuned("seeds")
     validation: str | None = tuned("validation")
@@ -457,44 +459,4 @@ class CsvOptions(TrajnetOptions, words="export csv", run="export:export_csv"):
 
 class ParquetOptions(CsvOptions, words="export parquet", run="export:export_parquet"):
     """Write tables of people, groups, members, events, crossings and counts as Parquet, of tracks or of labels."""
-
-
-class FitSensorOptions(Options, words="fit sensor", run="fit:fit_sensor"):
-    """Measure the errors of a detector, so that simulated detections have the same errors."""
-
-    sources: list[Path] = ARGUMENT("Recordings with gt and det, pooled.", metavar="SOURCE…")
-    out: Path = TOML("File to write: a [sensor] table.")
-    fps: float | None = FPS()
-
-
-class FitJointOptions(Options, words="fit joint", run="fit:fit_joint"):
-    """Learn the merges and splits of the tracker joint from simulated truth."""
-
-    names: list[str] = NAMES()
-    out: Path = TOML("File to write: parameters of joint, for --params.")
-    seeds: str = SEEDS("Seeds of the scenes to fit to.", "30000:30002")
-
-
-class FitGroupingOptions(FitJointOptions, BoxOptions, words="fit grouping", run="fit:fit_grouping"):
-    """Fit the belief of who belongs together to simulated scenes, or adapt it to a place by answers about pairs."""
-
-    names: list[str] = ARGUMENT(
-        "Scenarios, *.toml files or suites; with --labels, the recordings or tracks of the answers.",
-        metavar="NAME…|SOURCE…")
-    out: Path = TOML("File to write, for --grouping.")
-    labels: list[Path] = option(
-        "Answers that a page of `view` saved. The default belief is adapted to them. Can be given several times.", [],
-        metavar="FILE.json", flag="--labels")
-    events: list[str] = option(
-        "Fit the log-odds of events to this scenario or suite. Can be given several times. Default: the NAMEs.", [],
-        metavar="NAME", flag="--events")
-    camera: Path | None = CAMERA()
-
-
-class FitRelationalOptions(Options, words="fit relational", run="fit:fit_relational"):
-    """Learn the speed table of the tracker relational from simulated truth."""
-
-    names: list[str] = NAMES()
-    out: Path = TOML("File to write: parameters of relational, for --params.")
-    seeds: str = SEEDS(SEEDS_HELP, "30000:30004")
 # fmt: on

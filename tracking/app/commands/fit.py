@@ -5,17 +5,29 @@ together, the events of `joint`, and the speed table of `relational`.
 from __future__ import annotations
 
 import shlex
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from scenarios.errors import InputError, printable
+from scenarios.errors import InputError, printable, reject
 from sim.store.own_files import output_file
+from sim.types import Sequence as Recording
 from sim.types import Truth
 from tracking.app import option_parsing
-from tracking.app.command_options import FitGroupingOptions, FitJointOptions, FitRelationalOptions, FitSensorOptions
 from tracking.app.command_result import CommandResult
+from tracking.app.fit_options import (
+    FitGroupingOptions,
+    FitJointOptions,
+    FitRelationalOptions,
+    FitSceneOptions,
+    FitSensorOptions,
+)
+from tracking.app.sequence_workers import source_of
+
+if TYPE_CHECKING:
+    from tracking.fitting.scene_like import Likeness
 
 # Seeds of the simulated detections whose statistics are shown beside the measured ones.
 CHECK_SEEDS = range(30_000, 30_008)
@@ -53,6 +65,27 @@ def fit_sensor(options: FitSensorOptions) -> CommandResult:
     lines += ["", _use("--sensor", out)]
     data = {"file": out, "sensor": profile.model_dump(exclude_none=True), "measured": measured, "drawn": simulated}
     return CommandResult(data, "\n".join(lines))
+
+
+def fit_scene(options: FitSceneOptions) -> CommandResult:
+    """Writes a scenario like a recording as a TOML file."""
+    words = ["fit", "scene", str(options.source), *["--labels"] * options.labels]
+    out = output_file(options.out, ".toml")
+    found = scene_file(source_of(options, options.source).open(), options.labels, out, words)
+    lines = [found.text(), f"→ {out}: use it as a scenario, as in {shlex.join(['flockscope', 'generate', str(out)])}"]
+    return CommandResult({"file": out, **found.as_dict()}, "\n".join(lines))
+
+
+def scene_file(recordings: Sequence[Recording], labels: bool, out: Path, words: Sequence[str]) -> Likeness:
+    """Writes a scenario like the one recording, and returns it; words: of the command."""
+    from sim.store.atomic import write_file
+    from tracking.fitting.scene_like import scene_like
+
+    got = f"{len(recordings)} sequences"
+    reject(len(recordings) != 1, recordings[0].name, got, "one, of one camera", "give one of them")
+    found = scene_like(recordings[0], labels=labels)
+    write_file(out, f"# {shlex.join(['flockscope', *words])}\n{found.to_toml()}".encode())
+    return found
 
 
 def fit_grouping(options: FitGroupingOptions) -> CommandResult:

@@ -8,8 +8,9 @@ from pathlib import Path
 
 from scenarios.errors import InputError
 from sim.types import Sequence
-from tracking.app.command_options import FitGroupingOptions, GroupOptions
+from tracking.app.command_options import GroupOptions
 from tracking.app.command_result import CommandResult
+from tracking.app.fit_options import FitGroupingOptions
 from tracking.app.group_tables import group_row, group_tables
 from tracking.app.progress import ProgressMeter
 from tracking.app.sequence_workers import source_of

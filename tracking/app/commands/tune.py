@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from scenarios.errors import counted
+from scenarios.errors import InputError, counted
+from sim.store.own_files import output_file
 from tracking.app import option_parsing
 from tracking.app.command_options import TuneCommandOptions
 from tracking.app.command_result import CommandResult
@@ -15,10 +16,19 @@ NO_CHECK = "none"
 
 def tune(options: TuneCommandOptions) -> CommandResult:
     """Searches parameters as `tracking.tune` does, writes the files of --out, and returns the gain on test scenes."""
+    from tracking.app.commands.fit import scene_file
+    from tracking.recordings.source import open_source
     from tracking.tuning.result import short
     from tracking.tuning.search import tune as search
 
     given = dict(vars(options))
+    if (like := given.pop("like")) is not None:
+        scene = output_file(options.out, ".toml").with_suffix(".scene.toml")
+        scene_file(open_source(like, images=False), False, scene, ["fit", "scene", str(like)])
+        given["suite"] = [*options.suite, str(scene)]
+    elif not options.suite:
+        remedy = "give --suite NAME, or --like SOURCE"
+        raise InputError(place="--suite", got="no scenes", expected="scenes to tune on", remedy=remedy)
     sensor = option_parsing.sensor_settings(given.pop("sensor"))
     settings = option_parsing.settings(options.set, "tracker", option_parsing.SUBJECTS)
     given["set"] = [*sensor, *(f"{subject}.{text}" for subject, text in settings)]
