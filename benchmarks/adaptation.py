@@ -61,7 +61,7 @@ from tracking.tuning.adaptive import (
 )
 
 TRACKERS = "blob", "group-pda", "SORT", "ByteTrack"
-TRAINING, SUITES = ("drift", "quick"), ("drift",)
+TRAINING, SUITES = ("drift", "quick"), ("drift", "drift-other", "standard")
 LIMIT, SEED = 0.4, 0  # of the rule; of the searches
 SCENES = 2**31  # bytes of scenes that are kept
 SPREAD = 0.3  # standard deviation with which CMA-ES begins; of a linear policy, for statistics of unit variance
@@ -261,8 +261,8 @@ def adaptation(name: str, configs: int, train: range, seeds: range, picture: Pat
     residuals = np.array([offset for (_, offset), _ in every])
     rule = Policy(bench.base, EVERY, MEMORY, RULES[name], LIMIT)
     known = {
-        "defaults": (bench.still, still), **{key: best[key][0] for key in pools}, "rule": (rule, still),
-        "linear by CMA": best["lines"][0], "policy": (policy, still),
+        "defaults": (bench.still, still), **{key: best[key][0] for key in pools}, "rule": (rule, None),
+        "linear by CMA": best["lines"][0], "policy": (policy, None),
     }  # fmt: skip
     print(f"\n{name}: {rounds} rounds of {len(training)} training scenes; the best constant is that of {constant}")
     head(["search", *(f"{k} rounds" for k in MARKS if k <= rounds)])

@@ -174,8 +174,11 @@ class Rollout:
         tracks = self._grouped()
         if len(tracks) < len(self.tracks):
             tracks = self._whole(every=False)
-        frames = range(max(first, 1), len(self.tracks) + 1)
-        return self._scores(tracks, frames, every=False).get("objective", float("nan"))
+        first = max(first, 1)
+        window = tracks[first - 1 :]
+        if any(t.groups is None for t in window):
+            window = tracks  # groups are derived from earlier frames, too
+        return self._scores(window, range(first, len(self.tracks) + 1), every=False).get("objective", float("nan"))
 
     def _grouped(self) -> SequenceOf[Tracks]:
         self._completed += self._completion.add(self.tracks[self._fed :])
