@@ -1,141 +1,164 @@
-"""Does what was tuned on simulated scenes help on a recording?
+"""Does what was tuned on simulated scenes help on recordings?
 
-    python -m benchmarks.tuning [--trials 24] [--data FOLDER]
+    python -m benchmarks tuning [TRACKER …] [--trials 30] [--environments DIR] [--data FOLDER] [--json FILE]
 
-For each recording: the profile of its detector, fitted to the first half; a tracker tuned on the scenes of
-tuning_suites/boxes.toml with this detector at the recording's frame rate, training seeds; then HOTA of defaults and
-tuned parameters on the test seeds of these scenes, and on the second half of the recording. Differences have 95 %
-intervals: of scenes by sequences, of recordings by blocks of frames. The trackers: `blob`, and Follower, which stands
-for a tracker that nobody has tuned.
+Trackers of other libraries (benchmarks/peers) and `blob` get the boxes of PETS09-S2L1-first200, TUD-Campus and
+AVG-TownCentre-first225. HOTA with the defaults, with 95 % intervals by blocks of frames, and how much it changes on the
+whole recording with parameters that `tune` found (similarity by boxes, choice on validation seeds)
+
+standard    on the scenes of tuning_suites/peers.toml
+--like      on the scenes that `fit scene` makes of the recording's detections, without its labels
+labels of…  on the scenes that `fit scene --labels` makes of another recording: its people, camera and detector
+itself      on the recording itself, by as many draws as the search has trials, twice: what could be gained at most
+
+The first table has the mean over recordings, and over the trackers of other libraries.
 """
 
 from __future__ import annotations
 
+import json
 import tempfile
-from dataclasses import dataclass
+import warnings
+from collections.abc import Mapping
 from pathlib import Path
-from typing import ClassVar
+from typing import Any
 
 import numpy as np
-from scipy.optimize import linear_sum_assignment
 
-from benchmarks.fit_sensor import part
-from benchmarks.support.options import PETS, TOWN_CENTRE, add_data, new_parser
-from benchmarks.support.tables import interval, number, signed, table
-from scenarios import sensor_settings
-from scenarios.loading.resolve import dump_sensor
-from sim.types import Array, Context, Detections, Frame, Sequence, Tracks
-from tracking.config import Config, param
-from tracking.fitting.detection_matching import match_sequence
-from tracking.fitting.sensor import fit_matched
+from benchmarks.peers.adapters import PEERS
+from benchmarks.peers.environments import DEFAULT, make_environments
+from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE, add_data, new_parser, one_thread
+from benchmarks.support.tables import interval, signed, table
+from sim.types import Array, Sequence
+from tracking.config import Config
+from tracking.fitting.scene_like import scene_like
 from tracking.papers.blob.tracker import Blob
+from tracking.parameter_space import decode, moved, space_of
 from tracking.recording_ranking import presence_in
 from tracking.recordings.source import open_source
 from tracking.running.run import track
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scorer
 from tracking.stats import block_intervals
-from tracking.tuning.result import TuningResult, short
+from tracking.tuning.adaptive import drawn_residuals
+from tracking.tuning.result import short
 from tracking.tuning.search import tune
 
-SUITE = Path(__file__).parent / "tuning_suites" / "boxes.toml"
+SUITE = Path(__file__).parent / "tuning_suites" / "peers.toml"
+RECORDINGS = {"PETS09": PETS, "TownCentre": TOWN_CENTRE, "TUD-Campus": CAMPUS}
+NAMES = ("SORT", "ByteTrack", "OC-SORT", "norfair")
+KINDS = {name: PEERS[name][1] for name in NAMES} | {"blob": Blob}
 SCORE = "HOTA"
-COLUMNS = ["scenes: default", "tuned minus default", "recording: default", "tuned minus default", "changed"]
+SEED = 0  # of draws
+Found = dict[str, dict[str, list[float]]]  # by recording and way: the difference and its ends
 
 
-@dataclass(frozen=True)
-class FollowerConfig(Config):
-    """Parameters of `Follower`."""
-
-    tracker: ClassVar[str] = "follower"
-    reach: float = param(1.0, (0.1, 5.0), "m", "greatest distance from where a track is expected", "log")
-    patience: float = param(0.0, (0.0, 4.0), "s", "time for which a track waits for its next detection")
-    least_score: float = param(0.0, (0.0, 1.0), "", "detections with a lower score are left out")
-
-
-class Follower:
-    """Gives each detection to the track that is expected nearest to it if it goes on as before."""
-
-    needs = ("boxes", "points")
-    config_class = FollowerConfig
-
-    def __init__(self, config: FollowerConfig) -> None:
-        self.config = config
-
-    def reset(self, context: Context, seed: int) -> None:
-        """Forgets all tracks."""
-        self.wait, self.px_per_m = self.config.patience + 1.5 / context.fps, context.px_per_m
-        self.id, self.seen, self.next_id = np.zeros(0, np.int64), np.zeros(0), 0
-        self.pos, self.vel = np.zeros((0, 2)), np.zeros((0, 2))
-
-    def step(self, frame: Frame, detections: Detections) -> Tracks:
-        """Returns a track for each detection."""
-        kept = detections.score >= self.config.least_score
-        pos, box = detections.pos[kept], None if detections.box is None else detections.box[kept]
-        reach = self.config.reach * (1.0 if detections.plane == "ground" else self.px_per_m)
-        waiting = frame.t - self.seen <= self.wait
-        old_id, seen, old, vel = (x[waiting] for x in (self.id, self.seen, self.pos, self.vel))
-        gone = (frame.t - seen)[:, None]
-        distance = np.linalg.norm(pos[:, None] - (old + gone * vel)[None], axis=2)
-        new, at = linear_sum_assignment(np.minimum(distance, reach))
-        near = distance[new, at] < reach
-        new, at = new[near], at[near]
-        id = self.next_id + np.arange(len(pos))
-        self.next_id += len(id)
-        moved = np.zeros((len(id), 2))
-        id[new], moved[new] = old_id[at], (pos[new] - old[at]) / gone[at]
-        lost = np.delete(np.arange(len(old)), at)
-        self.id, self.seen = np.append(id, old_id[lost]), np.append(np.full(len(id), frame.t), seen[lost])
-        self.pos, self.vel = np.vstack([pos, old[lost]]), np.vstack([moved, vel[lost]])
-        alone, cov = np.full(len(id), -1), np.tile(np.eye(4), (len(id), 1, 1))
-        return Tracks(frame.index, frame.t, detections.plane, "person", id, alone, pos, moved, cov, box)
-
-
-def tuned(tracker: type, recording: Sequence, trials: int) -> TuningResult:
-    """Returns the result of a search on scenes with the detector and the frame rate of a recording."""
-    half = part(recording, 1, (recording.length or 0) // 2, match_sequence(recording).size)
-    with tempfile.TemporaryDirectory() as folder:
-        sensor = Path(folder) / "sensor.toml"
-        sensor.write_text(dump_sensor(fit_matched([half]), ""))
-        settings = (*sensor_settings(sensor), f"scenario.camera.fps={recording.fps:g}")
+def tuned(kind: Any, scenes: Path, trials: int, seeds: int) -> Config:
+    """Returns the parameters that `tune` finds for a tracker; seeds: of training, of each scene."""
     return tune(
-        tracker, SUITE, trials, objective=SCORE, detections="file", set=settings, check=None,
-        seeds=range(3), validation=range(10_000, 10_005), test=range(20_000, 20_008),
-    )  # fmt: skip
+        kind, scenes, trials, objective=SCORE, detections="file", similarity="boxes", check=None, finalists=3,
+        seeds=range(seeds), validation=range(10_000, 10_000 + 2 * seeds), test=range(20_000, 20_001),
+    ).config  # fmt: skip
 
 
-def on_second_half(tracker: type, recording: Sequence, config: Config) -> list[tuple[float, float, float]]:
-    """Returns the score of the defaults on the second half, and the difference of `config`, each with its interval."""
+def tuned_on_itself(kind: Any, recording: Sequence, trials: int) -> Config:
+    """Returns the best config of draws on the recording that it is judged on."""
+    base = kind.config_class()
+    space = space_of(type(base), "file")
+    drawn = drawn_residuals(space, trials, np.random.default_rng(SEED))
+    configs = [decode(space, moved(space, each, base), base) for each in drawn]
+    return max(configs, key=lambda config: gain(kind, recording, config)[0])
+
+
+def gain(kind: Any, recording: Sequence, config: Config) -> tuple[float, float, float]:
+    """Returns the score of a config minus that of the defaults on a recording, with its ends."""
+    return _scores(kind, recording, (kind.config_class(), config))[1]
+
+
+def _scores(kind: Any, recording: Sequence, configs: tuple[Config, Config]) -> list[tuple[float, float, float]]:
+    """Returns the score of the first config, and the difference of the second, each with its ends."""
     truth = recording.truth
     assert truth is not None
-    runs = [list(track(tracker, recording, params=c, detections="file")) for c in (type(config)(), config)]
-    default, other = (one.weighted_scores("hull") for one in Scorer(truth).compare(runs))
-    first, at = truth.length // 2, list(CATALOGUE).index(SCORE)
+    runs = [list(track(kind, recording, params=c, detections="file")) for c in configs]
+    first, second = (one.weighted_scores("hull") for one in Scorer(truth).compare(runs, "boxes"))
+    at = list(CATALOGUE).index(SCORE)
 
     def scores(weights: Array) -> Array:
-        every = np.hstack([np.zeros((len(weights), first)), weights])
-        return np.column_stack([default(every)[:, at], other(every)[:, at] - default(every)[:, at]])
+        return np.column_stack([first(weights)[:, at], second(weights)[:, at] - first(weights)[:, at]])
 
-    ends = np.array(block_intervals(scores, truth.length - first, truth.fps, presence_in(truth))).T
+    ends = np.array(block_intervals(scores, truth.length, truth.fps, presence_in(truth))).T
     return [tuple(CATALOGUE[SCORE].within(x, difference=bool(k)).tolist()) for k, x in enumerate(ends)]
+
+
+def played(name: str, recordings: Mapping[str, Sequence], scenes: Mapping[str, Path], trials: int) -> Found:
+    """Returns all gains of a tracker, and prints what was changed."""
+    kind = KINDS[name]
+    configs = {way: tuned(kind, file, trials, 1 if way == "standard" else 6) for way, file in scenes.items()}
+    found: Found = {}
+    for way, config in configs.items():
+        base = type(config)()
+        changed = [f"{p}={short(v)}" for p, v in config.as_dict().items() if v != getattr(base, p)]
+        print(f"{name}, {way}: {', '.join(changed) or 'nothing changed'}", flush=True)
+    for place, recording in recordings.items():
+        row = {"default": list(_scores(kind, recording, (kind.config_class(),) * 2)[0])}
+        chosen = {"standard": configs["standard"], "--like": configs[f"like {place}"]}
+        chosen |= {f"labels of {other}": configs[f"labels of {other}"] for other in recordings if other != place}
+        chosen["itself"] = tuned_on_itself(kind, recording, 2 * trials)
+        row |= {way: list(gain(kind, recording, config)) for way, config in chosen.items()}
+        found[place] = row
+        print(name, place, {way: round(values[0], 3) for way, values in row.items()}, flush=True)
+    return found
+
+
+def show(every: Mapping[str, Found]) -> None:
+    """Prints the tables."""
+    ways = ["standard", "--like", "labels of another", "itself"]
+
+    def mean(row: Mapping[str, list[float]], way: str) -> float:
+        labelled = [values[0] for key, values in row.items() if key.startswith("labels of")]
+        return float(np.mean(labelled)) if way == "labels of another" else row[way][0]
+
+    gains = {name: {way: [mean(row, way) for row in found.values()] for way in ways} for name, found in every.items()}
+    rows = {name: [f"{np.mean(each[way]):+.3f}" for way in ways] for name, each in gains.items()}
+    others = [name for name in NAMES if name in gains]
+    if others:
+        rows["mean of the libraries"] = [f"{np.mean([gains[n][way] for n in others]):+.3f}" for way in ways]
+        rows["their worst"] = [f"{np.min([gains[n][way] for n in others]):+.3f}" for way in ways]
+    table(f"{SCORE} minus that of the defaults, mean of the recordings", "tracker", ways, rows)
+    for name, found in every.items():
+        columns = ["default", "standard", "--like", *(f"labels of {place}" for place in RECORDINGS), "itself"]
+        cells = {
+            place: [interval(*row["default"]), *(signed(*row[way]) if way in row else "–" for way in columns[1:])]
+            for place, row in found.items()
+        }
+        table(f"{name}, {SCORE}", "recording", columns, cells)
 
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("--trials", type=int, default=24)
+    parser.add_argument("trackers", nargs="*", default=list(KINDS), choices=list(KINDS), metavar="TRACKER")
+    parser.add_argument("--trials", type=int, default=30, help="trials of each search")
+    parser.add_argument("--environments", type=Path, default=DEFAULT, metavar="DIR", help="folder of the libraries")
+    parser.add_argument("--json", type=Path, help="file that keeps what was played, from which a run goes on")
     add_data(parser)
     args = parser.parse_args()
-    for tracker in (Follower, Blob):
-        rows = {}
-        for name in (PETS, TOWN_CENTRE):
-            (recording,) = open_source(args.data / name, images=False)
-            found = tuned(tracker, recording, args.trials)
-            old, new = on_second_half(tracker, recording, found.config)
-            ours = next((c for c in found.comparisons if c.key == SCORE), None)
-            scenes = ["–", "–"] if ours is None else [number(ours.before), signed(ours.difference, ours.low, ours.high)]
-            changed = ", ".join(f"{key} {short(before)} → {short(now)}" for key, (before, now) in found.changed.items())
-            rows[Path(name).name] = [*scenes, interval(*old), signed(*new), changed or "nothing"]
-        table(f"{tracker.__name__}, {SCORE}", "recording", COLUMNS, rows)
+    one_thread()
+    warnings.simplefilter("ignore")
+    make_environments(args.environments, ("roboflow", "norfair"))
+    recordings = {name: open_source(args.data / path, images=False)[0] for name, path in RECORDINGS.items()}
+    every: dict[str, Found] = json.loads(args.json.read_text()) if args.json and args.json.exists() else {}
+    with tempfile.TemporaryDirectory() as folder:
+        scenes = {"standard": SUITE}
+        for name, recording in recordings.items():
+            for way, labels in ((f"like {name}", False), (f"labels of {name}", True)):
+                scenes[way] = Path(folder) / f"{way.replace(' ', '-')}.toml"
+                scenes[way].write_text(scene_like(recording, labels=labels).to_toml())
+        for name in args.trackers:
+            if name not in every:
+                every[name] = played(name, recordings, scenes, args.trials)
+                if args.json:
+                    args.json.write_text(json.dumps(every))
+    show({name: every[name] for name in args.trackers})
 
 
 if __name__ == "__main__":
