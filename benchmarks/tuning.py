@@ -136,7 +136,7 @@ def show(every: Mapping[str, Found]) -> None:
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("trackers", nargs="*", default=list(KINDS), choices=list(KINDS), metavar="TRACKER")
+    parser.add_argument("trackers", nargs="*", default=tuple(KINDS), choices=tuple(KINDS), metavar="TRACKER")
     parser.add_argument("--trials", type=int, default=30, help="trials of each search")
     parser.add_argument("--environments", type=Path, default=DEFAULT, metavar="DIR", help="folder of the libraries")
     parser.add_argument("--json", type=Path, help="file that keeps what was played, from which a run goes on")
