@@ -334,7 +334,7 @@ def draw(bench: Bench, scene: Scene, policy: Policy, out: Path) -> None:
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("trackers", nargs="*", default=TRACKERS, choices=SEARCHED)
+    parser.add_argument("trackers", nargs="*", choices=tuple(SEARCHED), metavar="TRACKER")
     parser.add_argument("--configs", type=int, default=24, help="constants that a policy is learned from")
     add_seeds(parser, "0:2", "--train", "of training: ")
     add_seeds(parser, "20000:20003", what="of test: ")
@@ -345,7 +345,7 @@ def main() -> None:
     warnings.simplefilter("ignore")
     one_thread()
     make_environments(given.environments, ("cmaes", "roboflow"))
-    for k, tracker in enumerate(given.trackers):
+    for k, tracker in enumerate(given.trackers or TRACKERS):
         pictures = (given.out, given.chart) if k == 0 else (None, None)
         adaptation(tracker, given.configs, given.train, given.seeds, *pictures)
 

@@ -136,13 +136,14 @@ def show(every: Mapping[str, Found]) -> None:
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("trackers", nargs="*", default=tuple(KINDS), choices=tuple(KINDS), metavar="TRACKER")
+    parser.add_argument("trackers", nargs="*", choices=tuple(KINDS), metavar="TRACKER")
     parser.add_argument("--trials", type=int, default=30, help="trials of each search")
     parser.add_argument("--environments", type=Path, default=DEFAULT, metavar="DIR", help="folder of the libraries")
     parser.add_argument("--json", type=Path, help="file that keeps what was played, from which a run goes on")
     add_data(parser)
     args = parser.parse_args()
     one_thread()
+    trackers = args.trackers or list(KINDS)
     warnings.simplefilter("ignore")
     make_environments(args.environments, ("roboflow", "norfair"))
     recordings = {name: open_source(args.data / path, images=False)[0] for name, path in RECORDINGS.items()}
@@ -153,12 +154,12 @@ def main() -> None:
             for way, labels in ((f"like {name}", False), (f"labels of {name}", True)):
                 scenes[way] = Path(folder) / f"{way.replace(' ', '-')}.toml"
                 scenes[way].write_text(scene_like(recording, labels=labels).to_toml())
-        for name in args.trackers:
+        for name in trackers:
             if name not in every:
                 every[name] = played(name, recordings, scenes, args.trials)
                 if args.json:
                     args.json.write_text(json.dumps(every))
-    show({name: every[name] for name in args.trackers})
+    show({name: every[name] for name in trackers})
 
 
 if __name__ == "__main__":
