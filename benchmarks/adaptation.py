@@ -36,7 +36,7 @@ import numpy as np
 from benchmarks.peers.adapters import PEERS, ByteTrackConfig, SortConfig
 from benchmarks.peers.environments import DEFAULT, make_environments
 from benchmarks.support import chart
-from benchmarks.support.options import add_seeds, new_parser, one_thread
+from benchmarks.support.options import add_seeds, add_trackers, new_parser, one_thread
 from benchmarks.support.tables import difference_cell, head, mean_cell, row
 from scenarios.errors import OrderError
 from scenarios.schema.schedule import Schedule
@@ -334,7 +334,7 @@ def draw(bench: Bench, scene: Scene, policy: Policy, out: Path) -> None:
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("trackers", nargs="*", choices=tuple(SEARCHED), metavar="TRACKER")
+    add_trackers(parser, SEARCHED)
     parser.add_argument("--configs", type=int, default=24, help="constants that a policy is learned from")
     add_seeds(parser, "0:2", "--train", "of training: ")
     add_seeds(parser, "20000:20003", what="of test: ")

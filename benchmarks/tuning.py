@@ -27,7 +27,7 @@ import numpy as np
 
 from benchmarks.peers.adapters import PEERS
 from benchmarks.peers.environments import DEFAULT, make_environments
-from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE, add_data, new_parser, one_thread
+from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE, add_data, add_trackers, new_parser, one_thread
 from benchmarks.support.tables import interval, signed, table
 from sim.types import Array, Sequence
 from tracking.config import Config
@@ -136,7 +136,7 @@ def show(every: Mapping[str, Found]) -> None:
 
 def main() -> None:
     parser = new_parser(__doc__)
-    parser.add_argument("trackers", nargs="*", choices=tuple(KINDS), metavar="TRACKER")
+    add_trackers(parser, KINDS)
     parser.add_argument("--trials", type=int, default=30, help="trials of each search")
     parser.add_argument("--environments", type=Path, default=DEFAULT, metavar="DIR", help="folder of the libraries")
     parser.add_argument("--json", type=Path, help="file that keeps what was played, from which a run goes on")

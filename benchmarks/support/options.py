@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import os
+from collections.abc import Iterable
 from pathlib import Path
 
 from sim.workers.calls import THREAD_VARIABLES
@@ -45,6 +46,18 @@ def add_data(parser: argparse.ArgumentParser) -> None:
     """Adds --data, the folder of real recordings: by default $FLOCKSCOPE_DATA, else ../shared/data."""
     default = Path(os.environ.get("FLOCKSCOPE_DATA", SHARED_DATA))
     parser.add_argument("--data", type=Path, default=default, metavar="FOLDER", help="folder of real recordings")
+
+
+def add_trackers(parser: argparse.ArgumentParser, known: Iterable[str]) -> None:
+    """Adds the names of trackers as an argument; `trackers` is [] without any. known: those that may be given."""
+
+    def name(text: str) -> str:
+        if text not in known:
+            raise argparse.ArgumentTypeError(f"{text}: give {', '.join(known)}")
+        return text
+
+    known = tuple(known)
+    parser.add_argument("trackers", nargs="*", type=name, metavar="TRACKER", help=f"{', '.join(known)}; all if absent")
 
 
 def one_thread() -> None:
