@@ -99,6 +99,7 @@ COMMANDS = {
     ),
     "replay": ("replay {one} --set camera.image=[128,96] --out {out}", "replay {out}/nothing --out {out}/x"),
     "fit sensor": ("fit sensor {data} --out {out}/mine.toml", "fit sensor {out}/nothing --out {out}/mine.toml"),
+    "fit scene": ("fit scene {one} --out {out}/like.toml", "fit scene {data} --out {out}/like.toml"),
     "fit grouping": (
         "fit grouping side-by-side --seeds 0 --out {out}/mine.toml",
         "fit grouping no-such-scene --out {out}/mine.toml",
@@ -145,6 +146,10 @@ COMMANDS = {
     ),
     "sheet": ("sheet {one} --out {out}/sheet.png", "sheet {out}/nothing --out {out}/sheet.png"),
     "tune": (TUNE + " --trials 2 --seeds 0", TUNE + " --trials 2 --seeds 0:20000"),
+    "tune --like": (
+        TUNE.replace("--suite {scene}", "--like {one}") + " --trials 1 --seeds 0",
+        TUNE.replace("--suite {scene}", "") + " --trials 1 --seeds 0",
+    ),
     "validate": ("validate {data}", "validate {out}/nothing"),
     "export csv": ("export csv {data} --out {out}", "export csv {out}/nothing --out {out}/x"),
     "export parquet": ("export parquet {tracks}/scene-s40000 --out {out}", "export parquet {scene} --out {out}"),
@@ -267,7 +272,7 @@ def test_interrupted_and_full_disk_while_writing(name, error, code, as_json, pla
     assert run(words(COMMANDS[name][0], place) + ["--json"] * as_json) == code
     monkeypatch.undo()
     check_output(capsys, code, as_json)
-    left = {"tune": ["toy.journal", "toy.journal.lock"], "stress": ["episodes.jsonl"]}.get(name.split()[0], [])
+    left = {"tune": ["toy.journal", "toy.journal.lock"], "stress": ["episodes.jsonl"]}.get(name, [])
     assert sorted(p.name for p in place.out.rglob("*")) == left
 
 
