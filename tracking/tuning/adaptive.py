@@ -51,7 +51,7 @@ class Played:
     objective: float
 
 
-# play(policy, offset): plays all training scenes, in their order
+# play(policy, offset): plays all training scenes, in their order; [] if the tracker fails with these parameters
 PlayAll = Callable[[Policy, Array], list[Played]]
 
 
@@ -125,18 +125,24 @@ def searched_policy(
     pool = list[list[Played]]()
     for k, offset in enumerate(drawn_residuals(space, configs, random)):
         report(f"policy: configs, {k + 1} of {configs}")
-        pool.append(play(best, offset))
-    constants, most = list(pool), mean_objective(pool[0])
+        pool += _known(play(best, offset))
+    constants, most = list(pool), mean_objective(pool[0]) if pool else -math.inf
     for again in (0, configs // 2):
         report(f"policy: {again} configs round the best")
-        pool += [play(best, offset) for offset in drawn_residuals(space, again + 1, random)[1:]]
-        for fit in FITS:
+        for offset in drawn_residuals(space, again + 1, random)[1:]:
+            pool += _known(play(best, offset))
+        for fit in FITS if pool else ():
             report("policy: fits")
             made = fitted_policy(base, space, pool, *fit)
-            pool.append(play(made, np.zeros(len(space))))
-            if mean_objective(pool[-1]) > most:
-                best, most = made, mean_objective(pool[-1])
+            played = _known(play(made, np.zeros(len(space))))
+            pool += played
+            if played and mean_objective(played[0]) > most:
+                best, most = made, mean_objective(played[0])
     return best, constants
+
+
+def _known(played: list[Played]) -> list[list[Played]]:
+    return [played] if played else []
 
 
 def mean_objective(played: Sequence[Played]) -> float:

@@ -22,8 +22,8 @@ from tracking.episodes.tuned_tracker import TunedTracker
 from tracking.parameter_space import Space
 from tracking.running.policy import Policy
 from tracking.scoring.people import Similarity
-from tracking.tuning.adaptive import EVERY, MEMORY, Played, play_policy, searched_policy
-from tracking.tuning.candidates import Comparison, compare_episodes
+from tracking.tuning.adaptive import Played, play_policy, searched_policy
+from tracking.tuning.candidates import Comparison, HeldOutEvaluator, compare_episodes
 from tracking.tuning.search_plan import SearchPlan
 
 
@@ -85,13 +85,15 @@ def online_space(plan: SearchPlan) -> Space:
 
 
 def adapted(
-    plan: SearchPlan, config: Config, training: Sequence[Source], configs: int, report: Callable[[str], None]
+    plan: SearchPlan, config: Config, training: Sequence[Source], configs: int, evaluator: HeldOutEvaluator
 ) -> Adapted:
     """Returns a policy that begins with `config`, if it is surely better on the validation scenes.
 
     training: scenes of the plan whose script comes true. configs: number of constant configs to play on them, of which
-    it is learned.
+    it is learned; those with which the tracker fails are left out. evaluator: knows what `config` plays on other
+    scenes.
     """
+    report = evaluator.report
     space = online_space(plan)
     if not training:
         return Adapted(None, (), "the constant stays: no training scene can be played")
@@ -99,19 +101,24 @@ def adapted(
     with playing_workers(plan.options.workers, plan.options.cluster) as run:
 
         def play(policy: Policy, offset: Array) -> list[Played]:
-            return _played(run, play_windows, [WindowsTask(plan.tracker, s, policy, offset, *given) for s in training])
+            tasks = [WindowsTask(plan.tracker, source, policy, offset, *given) for source in training]
+            found = _played(run, play_windows, tasks)
+            return [] if isinstance(found, FlockscopeError) else found
 
-        def episodes(sources: Sequence[Source], policy: Policy) -> list[Episode]:
-            more = plan.detections, False, plan.options.similarity, policy
-            return _played(run, play_task, [EpisodeTask(plan.tracker, s, {}, *more) for s in sources])
+        def episodes(sources: Sequence[Source]) -> list[Episode] | FlockscopeError:
+            more = plan.detections, False, plan.options.similarity, best
+            return _played(run, play_task, [EpisodeTask(plan.tracker, source, {}, *more) for source in sources])
 
         best, _ = searched_policy(play, config, space, configs, plan.options.seed, report)
         if not any(best.weights.values()):
             return Adapted(None, (), "the constant stays: no policy is better in training")
         report("policy: validation")
-        goal, comparisons, still = plan.goals[0], list[Comparison](), Policy(config, EVERY, MEMORY, {})
+        goal, comparisons = plan.goals[0], list[Comparison]()
         for name, sources in {"validation": plan.validation, **plan.tests}.items():
-            before, after = (episodes(sources, one) for one in (still, best))
+            before, after = evaluator.episodes(sources, config), episodes(sources)
+            if isinstance(before, FlockscopeError) or isinstance(after, FlockscopeError):
+                error = before if isinstance(before, FlockscopeError) else after
+                return Adapted(None, tuple(comparisons), f"the constant stays: {name}: {error}")
             found = compare_episodes(name, goal, before, after)
             comparisons += [] if found is None else [found]
             if name == "validation" and (found is None or found.verdict != "better"):
@@ -120,13 +127,15 @@ def adapted(
     return Adapted(best, tuple(comparisons), "the policy is kept: surely better than the constant in validation")
 
 
-def _played(run: RunItems, function: Callable[[Task], R | FlockscopeError], tasks: Sequence[Task]) -> list[R]:
-    """Returns what the function makes of the tasks, in their order. Raises the first error."""
+def _played(
+    run: RunItems, function: Callable[[Task], R | FlockscopeError], tasks: Sequence[Task]
+) -> list[R] | FlockscopeError:
+    """Returns what the function makes of the tasks, in their order, or the first error. Raises that of workers."""
     from sim.workers.start import results_in_order
 
     found = list[R]()
     for result in results_in_order(run, function, tasks, lambda task, error: error.replaced(file=task.tracker.name)):
         if isinstance(result, FlockscopeError):
-            raise result
+            return result
         found.append(result)
     return found

@@ -246,6 +246,11 @@ class HeldOutEvaluator:
             found += [comparison for comparison in made if comparison is not None]
         return found, notes
 
+    def episodes(self, sources: Sequence[Source], config: Config) -> list[Episode] | FlockscopeError:
+        """Returns the config's episodes on the validation scenes or those of a test; or the error of a config that
+        cannot be played."""
+        return self._episodes(sources, config, sources != self.plan.validation or self.plan.needs_every_score)
+
     def _validation(self, config: Config) -> list[Episode] | FlockscopeError:
         return self._episodes(self.plan.validation, config, self.plan.needs_every_score)
 

@@ -86,9 +86,9 @@ def _search(options: TuneOptions) -> TuningResult:
         left_out = study.left_out()
         evaluator.count(plan.training, left_out)
         found = replace(_evaluated(plan, study, evaluator), taken_over=taken_over)
-    if options.adaptive is not None:
-        training = [source for source, why in zip(plan.training, left_out, strict=True) if not why]
-        found = replace(found, adapted=adapted(plan, found.config, training, options.adaptive, report))
+        if options.adaptive is not None:
+            training = [source for source, why in zip(plan.training, left_out, strict=True) if not why]
+            found = replace(found, adapted=adapted(plan, found.config, training, options.adaptive, evaluator))
     if target is not None:
         found.write(target)
     evaluator.require_most()

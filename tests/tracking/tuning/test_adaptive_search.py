@@ -4,22 +4,34 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import optuna
 import pytest
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, WorkError
+from sim.types import Array
 from tests.processes import TOY
 from tests.tuning_toys import toy_plan, tune_arguments, write_scenes
 from tracking.app.cli import run
 from tracking.config import Config
+from tracking.environment.env import TuningEnv
 from tracking.parameter_space import Space
 from tracking.running.policy import Policy, read_policy
-from tracking.tuning import adaptive
-from tracking.tuning.adaptive_search import adapted
+from tracking.tuning import adaptive, adaptive_search
+from tracking.tuning.adaptive import Played
+from tracking.tuning.adaptive_search import Adapted, adapted
+from tracking.tuning.candidates import HeldOutEvaluator
+from tracking.tuning.episode_player import episode_player
 from tracking.tuning.search import tune
+from tracking.tuning.search_plan import SearchPlan
 
 
-def quiet(text: str) -> None:
-    pass
+def adapted_toy(plan: SearchPlan) -> tuple[Adapted, int]:
+    """What 6 configs give on the toy, and how many episodes of the constant were played for it."""
+    given = plan.tracker, plan.detections, 1, None, plan.options.similarity
+    with episode_player(*given) as play:
+        evaluator = HeldOutEvaluator(plan, play, optuna.create_study())
+        found = adapted(plan, plan.base, plan.training, 6, evaluator)
+    return found, sum(len(stored) for stored in evaluator.study.user_attrs.values())
 
 
 def test_where_nothing_changes_the_constant_stays(tmp_path: Path) -> None:
@@ -40,14 +52,35 @@ def test_a_policy_that_surely_helps_is_kept(tmp_path: Path, monkeypatch: pytest.
 
     monkeypatch.setattr(adaptive, "fitted_policy", longer)
     plan = toy_plan(tmp_path, objective=(), adaptive=6)
-    found = adapted(plan, plan.base, plan.training, 6, quiet)
+    found, played = adapted_toy(plan)
     assert found.policy is not None
+    assert played == 18, "what the search has played of the constant is stored with it"
     assert [c.scenes for c in found.comparisons] == ["validation", "one.toml", "two.toml"]
     assert all(c.verdict == "better" for c in found.comparisons)
     (tmp_path / "p.toml").write_text(found.policy.to_toml())
     again = read_policy(type(plan.base), tmp_path / "p.toml")
     assert again is not None
     assert again.as_dict()["weights"] == {"reach": {"bias": 0.5}}
+
+
+def test_configs_with_which_the_tracker_fails_are_left_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    real = adaptive_search.play_policy
+
+    def picky(env: TuningEnv, policy: Policy, offset: Array | None = None) -> Played:
+        if offset is not None and offset[0]:
+            raise WorkError(file="toy", got="a reach that it dislikes", expected="others", remedy="none")
+        return real(env, policy, offset)
+
+    monkeypatch.setattr(adaptive_search, "play_policy", picky)
+    found, _ = adapted_toy(toy_plan(tmp_path, objective=(), adaptive=6))
+    assert found.line.startswith(("the constant stays: ", "the policy is kept"))
+
+    def failing(*_: object) -> Played:
+        raise WorkError(file="toy", got="all", expected="none", remedy="none")
+
+    monkeypatch.setattr(adaptive_search, "play_policy", failing)
+    found, _ = adapted_toy(toy_plan(tmp_path, objective=(), adaptive=6))
+    assert found.line == "the constant stays: no policy is better in training"
 
 
 def test_what_cannot_be_adapted_is_said_before_anything_is_played(tmp_path: Path) -> None:
