@@ -310,26 +310,28 @@ def best_by_part(training: Sequence[Scene], pool: Sequence[Sequence[Played]]) ->
 
 def draw(bench: Bench, scene: Scene, policy: Policy, out: Path) -> None:
     """Draws what a policy sees and does in one episode."""
+    import matplotlib
     from matplotlib.figure import Figure
 
-    played = bench.play(scene, policy)
+    played, still = bench.play(scene, policy), bench.play(scene, bench.still)
     t = EVERY * np.arange(len(played.seen))
-    moved = [policy.residual(seen) for seen in played.seen]
-    figure = Figure(figsize=(8, 7), layout="constrained")
-    above, middle, below = figure.subplots(3, 1, sharex=True)
-    for name in ("observed", "found", "extra", "residual", "nis"):
-        above.plot(t, played.seen[:, NAMES.index(name)], label=name)
-    for k, p in enumerate(policy.space):
-        middle.plot(t, [one[k] for one in moved], label=p.name)
-    below.plot(t[1:], played.score, label="policy")
-    below.plot(t[1:], bench.play(scene, bench.still).score, label="defaults")
-    for axes, words in ((above, "statistics"), (middle, "residuals"), (below, "objective of a window")):
-        for at in scene.changes:
-            axes.axvline(at, color="grey", linestyle="--")
-        axes.set_ylabel(words)
-        axes.legend(fontsize=7, loc="upper left", ncols=2)
-    below.set_xlabel(f"s, {scene.source.name} seed {scene.source.seed}")
-    figure.savefig(out)
+    moved = np.array([policy.residual(seen) for seen in played.seen])
+    panels = (
+        ("statistics, averaged", t, {name: played.seen[:, NAMES.index(name)] for name in TOLD}),
+        ("residual of a parameter", t, {p.name: column for p, column in zip(policy.space, moved.T, strict=True)}),
+        ("objective of a window", t[1:], {"policy": played.score, "defaults": still.score}),
+    )
+    with matplotlib.rc_context(chart.STYLE):
+        figure = Figure(figsize=(9.6, 8.0), layout="constrained")
+        for axes, (words, x, curves) in zip(figure.subplots(3, 1, sharex=True), panels, strict=True):
+            for k, (name, values) in enumerate(curves.items()):
+                axes.plot(x, values, "-" if k < len(chart.COLOURS) else ":", color=chart.colour(k), label=name)
+            for at in scene.changes:
+                axes.axvline(at, color="#777", linestyle="--", linewidth=1)
+            axes.set_ylabel(words)
+            axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+        axes.set_xlabel(f"s, {scene.source.name} seed {scene.source.seed}; dashed: the detector changes")
+        figure.savefig(out, metadata={"Date": None})
 
 
 def main() -> None:

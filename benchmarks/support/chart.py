@@ -15,6 +15,11 @@ MARKERS = "os^Dv*"
 STYLE = {"svg.hashsalt": "flockscope", "svg.fonttype": "none", "axes.grid": True, "grid.color": "#dcdfe4"}
 
 
+def colour(k: int) -> str:
+    """Returns the colour of the k-th curve."""
+    return COLOURS[k % len(COLOURS)]
+
+
 @dataclass(frozen=True)
 class Panel:
     """One chart.
@@ -40,9 +45,7 @@ def lines(panels: Sequence[Panel], path: Path, columns: int = 2) -> Path:
     """
     columns = min(columns, len(panels))
     names = list(dict.fromkeys(name for panel in panels for name in panel.curves))
-    looks = {
-        name: {"color": COLOURS[k % len(COLOURS)], "marker": MARKERS[k % len(MARKERS)]} for k, name in enumerate(names)
-    }
+    looks = {name: {"color": colour(k), "marker": MARKERS[k % len(MARKERS)]} for k, name in enumerate(names)}
     rows = -(-len(panels) // columns)
     path.parent.mkdir(parents=True, exist_ok=True)
     with matplotlib.rc_context(STYLE):
