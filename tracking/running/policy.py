@@ -2,8 +2,9 @@
 
 Every `every` s each parameter p takes the residual a_p = clip(b_p + sum_s w_ps o_s, -limit, limit) from the config that
 it begins with (`parameter_space.moved`). o_s are the statistics of `tracking.running.signals` of the frames since the
-last decision, averaged over time: o <- o + (1 - exp(-every / memory)) (new - o). The first decision is before frame 1,
-where all statistics are 0; the first average is the first new value. The same numbers come from a live run.
+last decision, averaged over time: o <- o + (1 - exp(-every / memory)) (new - o). Before frame 1, where nothing is seen
+and all statistics are 0, residuals are 0; the first average is the first new value. The same numbers come from a live
+run.
 
 A policy is a TOML file that can be read and edited:
 
@@ -84,7 +85,10 @@ class Policy:
         return tuple(p for p in type(self.base).space(online=True) if p.name in self.weights)
 
     def residual(self, seen: Array) -> Array:
-        """Returns the residual (P,) of each parameter of `space`, given the averaged statistics (K,)."""
+        """Returns the residual (P,) of each parameter of `space`, given the averaged statistics (K,); 0 before the first
+        frame, where they are 0."""
+        if not seen.any():
+            return np.zeros(len(self.space))
         rows = [self.weights[p.name] for p in self.space]
         matrix = np.array([[row.get(name, 0.0) for name in NAMES] for row in rows]).reshape(len(rows), len(NAMES))
         # as a sum along rows, whose order does not depend on the processor as that of a matrix product may

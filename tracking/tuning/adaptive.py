@@ -90,10 +90,12 @@ def fitted_policy(
     scenes = list(zip(*played, strict=True))
     seen = np.concatenate([[one.seen[:-1] for one in scene] for scene in scenes], axis=1)  # (C, windows, K)
     score = np.concatenate([[one.score for one in scene] for scene in scenes], axis=1)  # (C, windows)
+    later = seen.any(axis=(0, 2))  # not the windows before which nothing is seen
+    seen, score = seen[:, later], score[:, later]
     mean, sd = seen.mean(axis=(0, 1)), seen.std(axis=(0, 1))
     tells = np.flatnonzero((sd > LEAST_SD) & np.isin(NAMES, TOLD))
     z = np.concatenate([np.ones((*score.shape, 1)), (seen[..., tells] - mean[tells]) / sd[tells]], axis=2)
-    u = np.concatenate([[one.residual for one in scene] for scene in scenes], axis=1)  # (C, windows, P)
+    u = np.concatenate([[one.residual for one in scene] for scene in scenes], axis=1)[:, later]  # (C, windows, P)
     linear = (u[..., :, None] * z[..., None, :]).reshape(*score.shape, -1)
     surface = np.concatenate([linear, -np.square(u)], axis=2)
     x, y = (each - each.mean(axis=0) for each in (surface, score))

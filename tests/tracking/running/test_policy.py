@@ -38,6 +38,7 @@ def test_residuals_are_linear_and_clipped() -> None:
     assert [p.name for p in POLICY.space] == ["position_noise", "hidden_time"]
     assert POLICY.residual(seen(residual=0.5, found=0.4)) == pytest.approx([0.25, 0.1])
     assert POLICY.residual(seen(found=1.0)) == pytest.approx([-0.2, -0.2])
+    assert POLICY.residual(seen()).tolist() == [0.0, 0.0], "nothing is seen yet"
     steep = replace(POLICY, weights={"gate": {"residual": 50.0}, "accel_noise": {"residual": -50.0}})
     assert steep.residual(seen(residual=1.0)).tolist() == [-1.0, 1.0]  # in the order of the config
     assert (steep.config(seen(residual=1.0)).accel_noise, steep.config(seen()).accel_noise) == (0.05, 0.3)
