@@ -96,9 +96,10 @@ def scene_like(recording: Recording, *, labels: bool = False) -> Likeness:
     """Returns a scenario like a recording with a detector's boxes.
 
     labels: True takes people and errors of the detector from the recording's labels, False looks at detections alone.
+    Labels without detections give the detector of a scenario without keys.
     Raises InputError without boxes, with fewer than 2 people who are seen for 1.5 s, or if their boxes show no ground.
     """
-    recording = _numbered(recording)
+    recording = _numbered(recording, labels)
     walks = _walks(track("blob", recording, detections="truth" if labels else "file"), recording.fps)
     if len(walks) < 2:
         raise InputError(
@@ -108,7 +109,8 @@ def scene_like(recording: Recording, *, labels: bool = False) -> Likeness:
     size = recording.image_size or image_size_of_boxes(*[walk.box for walk in walks])
     people = _truth(walks, recording)
     if labels:
-        sensor, factor = fit_matched([match_sequence(recording)]), 1.0
+        known = recording.has_detections
+        sensor, factor = fit_matched([match_sequence(recording)]) if known else Sensor(), 1.0
     else:
         found = [frame.detections for frame in recording.without_pictures() if frame.detections is not None]
         sensor = fit_matched([match_detections(people, found, size)])
@@ -122,12 +124,13 @@ def scene_like(recording: Recording, *, labels: bool = False) -> Likeness:
     return Likeness(scenario, sensor, wanted)
 
 
-def _numbered(recording: Recording) -> Recording:
+def _numbered(recording: Recording, labels: bool) -> Recording:
     frames = list(recording.without_pictures())
-    if not any(f.detections is not None and f.detections.box is not None and len(f.detections.box) for f in frames):
+    boxed = labels and recording.truth is not None and recording.truth.box is not None
+    if not boxed and not any(f.detections is not None and f.detections.box is not None and len(f.detections.box) for f in frames):
         raise InputError(
             file=recording.name, got="no detected boxes", expected="a recording with the boxes of a detector",
-            remedy="add det/det.txt, or give a MOT text of detections",
+            remedy="add det/det.txt, give a MOT text of detections, or with labelled boxes --labels",
         )  # fmt: skip
     return recording if recording.length is not None else _recording(recording, frames)
 
@@ -290,7 +293,7 @@ def _place(walks: Sequence[Walk], recording: Recording, size: tuple[int, int]) -
     if fit is None or not ways:
         raise InputError(
             file=recording.name, got="boxes that stand on no ground", expected="boxes of people who stand and walk",
-            remedy="check that boxes hold whole people",
+            remedy="check that boxes hold whole people; a camera straight above shows no ground",
         )  # fmt: skip
     return Place(ways, fit.camera, recording.fps, (recording.length or 0) / recording.fps)
 
