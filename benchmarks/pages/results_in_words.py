@@ -98,11 +98,14 @@ def _speed() -> str:
 
 def tuning() -> str:
     """What tuning earns, and where it earns nothing."""
-    plain, blob = stored("tuning", "Follower")["rows"], stored("tuning", "Blob")["rows"]
-    scenes, real = (" and ".join(signed(row[k]) for row in plain) for k in (2, 4))
+    found = {row["tracker"]: row for row in rows("tuning", "HOTA minus")}
+    others, ours = found["mean of the libraries"], found["blob"]
+    count = len(found) - 3
     return (
-        f"What it earns: a nearest-neighbour tracker gains HOTA {scenes} on scenes like two recordings, and {real} on"
-        " the recordings themselves; `blob`, whose defaults are tuned already, there"
-        f" {' and '.join(signed(row[4]) for row in blob)}; a star: the 95 % interval does not hold 0"
-        f" {link('docs/results/trackers.md#does-tuning-on-simulated-scenes-help-on-recordings', 'tuning')}."
+        f"What it earns on {len(RECORDINGS)} recordings, mean HOTA: {count} trackers of other libraries"
+        f" {signed(others['standard'])} if tuned on standard scenes, {signed(others['--like'])} on scenes like the"
+        f" recording without its labels, {signed(others['labels of another'])} with the labels of another one, of"
+        f" {signed(others['itself'])} that there is to gain; `blob`, whose defaults are tuned already,"
+        f" {signed(ours['standard'])}, {signed(ours['--like'])}, {signed(ours['labels of another'])} of"
+        f" {signed(ours['itself'])} {link('docs/results/tuning.md', 'tuning')}."
     )
