@@ -16,6 +16,8 @@ from __future__ import annotations
 import json
 import warnings
 from collections.abc import Sequence
+from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -26,7 +28,7 @@ from scenarios.loading.resolve import load
 from scenarios.schema.sensor import Sensor
 from sim.detector.draws import false_scores, true_scores
 from sim.sequence import simulate
-from sim.types import Detections, Truth
+from sim.types import Frame, Truth
 from sim.types import Sequence as Recording
 from tracking.fitting.detection_matching import MatchedRecording, match_detections, match_sequence
 from tracking.fitting.error_statistics import error_statistics, simulated_detections
@@ -40,20 +42,32 @@ SCENE_SEEDS = range(SEED, SEED + 4)
 LOW, HIGH = 0.05, 0.95
 
 
-def part(recording: Recording, first: int, last: int, size: tuple[int, int]) -> MatchedRecording:
-    """Returns frames `first` to `last` of a recording as a recording of its own; size: of the image, px."""
+def cut(recording: Recording, first: int, last: int) -> Recording:
+    """Returns frames `first` to `last` of a recording, labels and detections, as a recording of its own."""
     truth = recording.truth
     assert truth is not None
     rows = (truth.frame >= first) & (truth.frame <= last)
     names = ("frame", "id", "group", "pos", "vel", "box", "visibility", "z")
-    cut = {name: getattr(truth, name)[rows] for name in names if getattr(truth, name) is not None}
-    cut["frame"] = cut["frame"] - (first - 1)
-    short: Truth = truth.replace(length=last - first + 1, labelled=None, unscored=None, **cut)
-    found: list[Detections] = []
-    for frame in recording.without_pictures():
-        if first <= frame.index <= last and frame.detections is not None:
-            found.append(frame.detections.replace(index=frame.index - first + 1))
-    return match_detections(short, found, size, recording.camera)
+    kept = {name: getattr(truth, name)[rows] for name in names if getattr(truth, name) is not None}
+    kept["frame"] = kept["frame"] - (first - 1)
+    short: Truth = truth.replace(length=last - first + 1, labelled=None, unscored=None, **kept)
+    frames = []
+    for k, frame in enumerate(islice(recording.without_pictures(), first - 1, last), 1):
+        assert frame.detections is not None
+        t = (k - 1) / recording.fps
+        frames.append(Frame(k, t, detections=frame.detections.replace(index=k, t=t)))
+    return replace(
+        recording, length=len(frames), frames=lambda: iter(frames), bare=None, load_truth=lambda: short,
+        has_images=False,
+    )  # fmt: skip
+
+
+def part(recording: Recording, first: int, last: int, size: tuple[int, int]) -> MatchedRecording:
+    """Returns frames `first` to `last` of a recording, matched; size: of the image, px."""
+    short = cut(recording, first, last)
+    assert short.truth is not None
+    found = [frame.detections for frame in short if frame.detections is not None]
+    return match_detections(short.truth, found, size, recording.camera)
 
 
 def drawn_statistics(second: MatchedRecording, profiles: dict[str, Sensor], draws: int) -> dict[str, dict[str, object]]:

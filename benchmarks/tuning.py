@@ -3,12 +3,14 @@
     python -m benchmarks tuning [TRACKER …] [--trials 30] [--environments DIR] [--data FOLDER] [--json FILE]
 
 Trackers of other libraries (benchmarks/peers) and `blob` get the boxes of PETS09-S2L1-first200, TUD-Campus and
-AVG-TownCentre-first225. HOTA with the defaults, with 95 % intervals by blocks of frames, and how much it changes on the
-whole recording with parameters that `tune` found (similarity by boxes, choice on validation seeds)
+AVG-TownCentre-first225. HOTA with the defaults, with 95 % intervals by blocks of frames, and how much it changes with
+parameters that `tune` found (similarity by boxes, choice on validation seeds)
 
 standard    on the scenes of tuning_suites/peers.toml
 --like      on the scenes that `fit scene` makes of the recording's detections, without its labels
-labels of…  on the scenes that `fit scene --labels` makes of another recording: its people, camera and detector
+labels      on the scenes that `fit scene --labels` makes of the first third of the recording: people, camera and
+            detector; judged on the rest
+labels of…  the same of another recording, the whole of it
 itself      on the recording itself, by four times as many draws as the search has trials, half of them round the
             defaults, half anywhere: what there is to gain
 
@@ -26,6 +28,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.fit_sensor import cut
 from benchmarks.peers.adapters import PEERS
 from benchmarks.peers.environments import DEFAULT, make_environments
 from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE, add_data, add_trackers, new_parser, one_thread
@@ -50,6 +53,7 @@ RECORDINGS = {"PETS09": PETS, "TownCentre": TOWN_CENTRE, "TUD-Campus": CAMPUS}
 NAMES = ("SORT", "ByteTrack", "OC-SORT", "norfair")
 KINDS = {name: PEERS[name][1] for name in NAMES} | {"blob": Blob}
 SCORE = "HOTA"
+LABELS = "labels of the first third"
 SEED, HALF = 0, 0.5  # of draws; share of the parameters that a draw anywhere changes
 Found = dict[str, dict[str, list[float]]]  # by recording and way: the difference and its ends
 
@@ -72,49 +76,66 @@ def tuned_on_itself(kind: Any, recording: Sequence, trials: int) -> Config:
     return max(configs, key=lambda config: gain(kind, recording, config)[0])
 
 
-def gain(kind: Any, recording: Sequence, config: Config) -> tuple[float, float, float]:
-    """Returns the score of a config minus that of the defaults on a recording, with its ends."""
-    return _scores(kind, recording, (kind.config_class(), config))[1]
+def gain(kind: Any, recording: Sequence, config: Config, first: int = 0) -> tuple[float, float, float]:
+    """Returns the score of a config minus that of the defaults on a recording but for its `first` frames, with its
+    ends."""
+    return _scores(kind, recording, (kind.config_class(), config), first)[1]
 
 
-def _scores(kind: Any, recording: Sequence, configs: tuple[Config, Config]) -> list[tuple[float, float, float]]:
+def _scores(
+    kind: Any, recording: Sequence, configs: tuple[Config, Config], first: int = 0
+) -> list[tuple[float, float, float]]:
     """Returns the score of the first config, and the difference of the second, each with its ends."""
     truth = recording.truth
     assert truth is not None
     runs = [list(track(kind, recording, params=c, detections="file")) for c in configs]
-    first, second = (one.weighted_scores("hull") for one in Scorer(truth).compare(runs, "boxes"))
+    one, two = (each.weighted_scores("hull") for each in Scorer(truth).compare(runs, "boxes"))
     at = list(CATALOGUE).index(SCORE)
 
     def scores(weights: Array) -> Array:
-        return np.column_stack([first(weights)[:, at], second(weights)[:, at] - first(weights)[:, at]])
+        every = np.hstack([np.zeros((len(weights), first)), weights])
+        return np.column_stack([one(every)[:, at], two(every)[:, at] - one(every)[:, at]])
 
-    ends = np.array(block_intervals(scores, truth.length, truth.fps, presence_in(truth))).T
+    ends = np.array(block_intervals(scores, truth.length - first, truth.fps, presence_in(truth))).T
     return [tuple(CATALOGUE[SCORE].within(x, difference=bool(k)).tolist()) for k, x in enumerate(ends)]
 
 
-def played(name: str, recordings: Mapping[str, Sequence], scenes: Mapping[str, Path], trials: int) -> Found:
-    """Returns all gains of a tracker, and prints what was changed."""
+def play(name: str, recordings: Mapping[str, Sequence], scenes: Mapping[str, Path], trials: int, found: Found) -> None:
+    """Adds all gains of a tracker that are not yet in `found`, and prints what was changed."""
     kind = KINDS[name]
-    configs = {way: tuned(kind, file, trials, 1 if way == "standard" else 6) for way, file in scenes.items()}
-    found: Found = {}
-    for way, config in configs.items():
-        base = type(config)()
-        changed = [f"{p}={short(v)}" for p, v in config.as_dict().items() if v != getattr(base, p)]
-        print(f"{name}, {way}: {', '.join(changed) or 'nothing changed'}", flush=True)
+    configs = dict[str, Config]()
+
+    def config(way: str) -> Config:
+        if way not in configs:
+            configs[way] = tuned(kind, scenes[way], trials, 1 if way == "standard" else 6)
+            base, now = kind.config_class().as_dict(), configs[way].as_dict()
+            changed = [f"{p}={short(value)}" for p, value in now.items() if value != base[p]]
+            print(f"{name}, {way}: {', '.join(changed) or 'nothing changed'}", flush=True)
+        return configs[way]
+
     for place, recording in recordings.items():
-        row = {"default": list(_scores(kind, recording, (kind.config_class(),) * 2)[0])}
-        chosen = {"standard": configs["standard"], "--like": configs[f"like {place}"]}
-        chosen |= {f"labels of {other}": configs[f"labels of {other}"] for other in recordings if other != place}
-        chosen["itself"] = tuned_on_itself(kind, recording, 4 * trials)
-        row |= {way: list(gain(kind, recording, config)) for way, config in chosen.items()}
-        found[place] = row
+        row = found.setdefault(place, {})
+        if "default" not in row:
+            row["default"] = list(_scores(kind, recording, (kind.config_class(),) * 2)[0])
+        ways = {"standard": "standard", "--like": f"like {place}", LABELS: f"third of {place}"}
+        ways |= {f"labels of {other}": f"labels of {other}" for other in recordings if other != place}
+        for way, scene in ways.items():
+            if way not in row:
+                first = third(recording) if way == LABELS else 0
+                row[way] = list(gain(kind, recording, config(scene), first))
+        if "itself" not in row:
+            row["itself"] = list(gain(kind, recording, tuned_on_itself(kind, recording, 4 * trials)))
         print(name, place, {way: round(values[0], 3) for way, values in row.items()}, flush=True)
-    return found
+
+
+def third(recording: Sequence) -> int:
+    """Returns the number of frames of the first third."""
+    return (recording.length or 0) // 3
 
 
 def show(every: Mapping[str, Found]) -> None:
     """Prints the tables."""
-    ways = ["standard", "--like", "labels of another", "itself"]
+    ways = ["standard", "--like", LABELS, "labels of another", "itself"]
 
     def mean(row: Mapping[str, list[float]], way: str) -> float:
         labelled = [values[0] for key, values in row.items() if key.startswith("labels of")]
@@ -128,7 +149,7 @@ def show(every: Mapping[str, Found]) -> None:
         rows["their worst"] = [f"{np.min([gains[n][way] for n in others]):+.3f}" for way in ways]
     table(f"{SCORE} minus that of the defaults, mean of the recordings", "tracker", ways, rows)
     for name, found in every.items():
-        columns = ["default", "standard", "--like", *(f"labels of {place}" for place in RECORDINGS), "itself"]
+        columns = ["default", *ways[:3], *(f"labels of {place}" for place in RECORDINGS), "itself"]
         cells = {
             place: [interval(*row["default"]), *(signed(*row[way]) if way in row else "–" for way in columns[1:])]
             for place, row in found.items()
@@ -153,14 +174,18 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         scenes = {"standard": SUITE}
         for name, recording in recordings.items():
-            for way, labels in ((f"like {name}", False), (f"labels of {name}", True)):
+            begin = cut(recording, 1, third(recording))
+            for way, seen in (
+                (f"like {name}", recording),
+                (f"labels of {name}", recording),
+                (f"third of {name}", begin),
+            ):
                 scenes[way] = Path(folder) / f"{way.replace(' ', '-')}.toml"
-                scenes[way].write_text(scene_like(recording, labels=labels).to_toml())
+                scenes[way].write_text(scene_like(seen, labels=not way.startswith("like")).to_toml())
         for name in trackers:
-            if name not in every:
-                every[name] = played(name, recordings, scenes, args.trials)
-                if args.json:
-                    args.json.write_text(json.dumps(every))
+            play(name, recordings, scenes, args.trials, every.setdefault(name, {}))
+            if args.json:
+                args.json.write_text(json.dumps(every))
     show({name: every[name] for name in trackers})
 
 

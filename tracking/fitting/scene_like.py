@@ -37,7 +37,7 @@ from tracking.fitting.sensor import fit_matched
 from tracking.grouping.ground_of_boxes import fit_ground
 from tracking.running.run import track
 
-LASTING, LEAST = 1.5, 5  # s and detections of a track that counts as a person
+LEAST, LASTING = 5, 1.5  # frames of a person who is seen; s of a track that counts as a person
 SMOOTH = 1.0  # s over which boxes are smoothed
 SEEDS = range(30_000, 30_004)  # of the simulated detections
 TRIES = 2  # of how often ways are walked
@@ -99,11 +99,13 @@ def scene_like(recording: Recording, *, labels: bool = False) -> Likeness:
     Labels without detections give the detector of a scenario without keys.
     Raises InputError without boxes, with fewer than 2 people who are seen for 1.5 s, or if their boxes show no ground.
     """
-    recording = _numbered(recording, labels)
-    walks = _walks(track("blob", recording, detections="truth" if labels else "file"), recording.fps)
+    recording = _checked(recording, labels)
+    run = track("blob", recording, detections="truth" if labels else "file")
+    walks = _walks(run, recording.fps, 0.0 if labels else LASTING)
     if len(walks) < 2:
+        got = f"{len(walks)} people seen for {LASTING:g} s" if not labels else f"{len(walks)} labelled people"
         raise InputError(
-            file=recording.name, got=f"{len(walks)} people seen for {LASTING:g} s", expected="2 or more",
+            file=recording.name, got=got, expected="2 or more",
             remedy="give a longer recording, or more frames per second",
         )  # fmt: skip
     size = recording.image_size or image_size_of_boxes(*[walk.box for walk in walks])
@@ -124,10 +126,12 @@ def scene_like(recording: Recording, *, labels: bool = False) -> Likeness:
     return Likeness(scenario, sensor, wanted)
 
 
-def _numbered(recording: Recording, labels: bool) -> Recording:
+def _checked(recording: Recording, labels: bool) -> Recording:
+    """Returns the recording, with its length known. Raises InputError if it has no boxes."""
+    if labels and recording.truth is not None and recording.truth.box is not None:
+        return recording
     frames = list(recording.without_pictures())
-    boxed = labels and recording.truth is not None and recording.truth.box is not None
-    if not boxed and not any(f.detections is not None and f.detections.box is not None and len(f.detections.box) for f in frames):
+    if not any(f.detections.box is not None and len(f.detections.box) for f in frames if f.detections is not None):
         raise InputError(
             file=recording.name, got="no detected boxes", expected="a recording with the boxes of a detector",
             remedy="add det/det.txt, give a MOT text of detections, or with labelled boxes --labels",
@@ -143,8 +147,8 @@ def _recording(like: Recording, frames: Sequence[Frame]) -> Recording:
     )
 
 
-def _walks(run: Sequence[Tracks], fps: float) -> list[Walk]:
-    """Returns the walks of tracks that last, in the order of their ids."""
+def _walks(run: Sequence[Tracks], fps: float, lasting: float = LASTING) -> list[Walk]:
+    """Returns the walks of tracks that last so many s, in the order of their ids."""
     from scipy.signal import savgol_filter
 
     rows = [(t.measured, t.id, t.group, t.box, np.full(len(t.id), t.index)) for t in run if t.box is not None]
@@ -155,7 +159,7 @@ def _walks(run: Sequence[Tracks], fps: float) -> list[Walk]:
     for each in np.unique(id[measured]):
         mine = measured & (id == each)
         at, seen = frame[mine], box[mine]
-        if np.ptp(at) < LASTING * fps or len(at) < LEAST or not (seen[:, 2:] > 0).all():
+        if np.ptp(at) < lasting * fps or len(at) < LEAST or not (seen[:, 2:] > 0).all():
             continue
         every = np.arange(at[0], at[-1] + 1)
         shape = np.column_stack([centres(seen)[:, 0], seen[:, 1] + seen[:, 3], np.log(seen[:, 2]), np.log(seen[:, 3])])

@@ -85,8 +85,8 @@ class Policy:
         return tuple(p for p in type(self.base).space(online=True) if p.name in self.weights)
 
     def residual(self, seen: Array) -> Array:
-        """Returns the residual (P,) of each parameter of `space`, given the averaged statistics (K,); 0 before the first
-        frame, where they are 0."""
+        """Returns the residual (P,) of each parameter of `space`, given the averaged statistics (K,); 0 where these are
+        0, which is before frame 1."""
         if not seen.any():
             return np.zeros(len(self.space))
         rows = [self.weights[p.name] for p in self.space]
