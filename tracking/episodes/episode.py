@@ -111,7 +111,7 @@ class Rollout:
         streams = streams_for(self.tracker, self.detections)
         open_source = OpenedSource if self.cache is None else self.cache.open
         self.opened: OpenedSource = open_source(self.source, streams)
-        self.truth: Truth = self.opened.truth
+        _ = self.truth  # a source without labels cannot be played
         self.prepared = prepare(
             self.tracker, self.sequence, params=self.config, detections=self.detections, seed=self.tracker_seed,
             inputs=self.opened.input_frames,
@@ -133,6 +133,11 @@ class Rollout:
     def sequence(self) -> Sequence:
         """The opened sequence that is played."""
         return self.opened.sequence
+
+    @property
+    def truth(self) -> Truth:
+        """The labels of the sequence."""
+        return self.opened.truth
 
     @property
     def length(self) -> int:
