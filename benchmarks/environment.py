@@ -204,9 +204,10 @@ def verdict(check: Callable[[Make], None], make: Make) -> str:
 
 def random_episodes(trackers: tuple[str, ...], count: int, seed: int) -> None:
     """Prints how many random episodes were played, and what was wrong with them."""
-    rng, cache, wrong = np.random.default_rng(seed), SourceCache(2**30), Counter[str]()
-    done, steps = Counter[str](), Counter[str]()
+    cache = SourceCache(2**30)
+    done, steps, wrong = (Counter[str]() for _ in range(3))
     for k in range(count):
+        rng = np.random.default_rng((seed, k))  # so that an episode can be played alone
         tracker = str(rng.choice(trackers))
         try:
             steps[tracker] += random_episode(tracker, rng, cache)
