@@ -21,7 +21,7 @@ from gymnasium.wrappers import (
 )  # fmt: skip
 
 import tracking
-from scenarios.errors import InputError
+from scenarios.errors import InputError, WorkError
 from scenarios.loading.resolve import load
 from sim.dataset.generate import generate
 from sim.sequence import simulate
@@ -129,6 +129,28 @@ def test_the_objective_is_not_known_before_the_end_of_windows():
     env = make(decision_every=None)
     _, rewards, info = played(env, seed=0)
     assert rewards.tolist() == [info["objective"]]
+
+
+class FarAway(Toy):
+    """Is 100 m off if `skip` is not 0."""
+
+    def step(self, frame, detections):
+        found = super().step(frame, detections)
+        return found.replace(pos=found.pos + 100.0 * (self.config.skip > 0))
+
+
+@pytest.mark.parametrize("every", [None, 4])
+def test_parameters_may_lead_far_away(every):
+    """That nobody tracked is near a detection is a mistake of the tracker with the parameters that it begins with."""
+    env = make(FarAway, "cross", decision_every=every).unwrapped
+    _, info = env.reset(seed=0)
+    ended, action = False, np.float32([name == "skip" for name in info["names"]])
+    while not ended:
+        *_, ended, _, info = env.step(action)
+    assert info["params"]["skip"] == 4
+    assert info["scores"]["HOTA"] == 0
+    with pytest.raises(WorkError, match="expected people in m near the detections"):
+        played(env, None, seed=0, options={"params": {"skip": 1}})
 
 
 def test_a_scene_without_people_or_tracks_is_right():
