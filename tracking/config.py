@@ -141,7 +141,7 @@ class Config:
     @classmethod
     def params(cls) -> dict[str, Param]:
         """Returns all parameters that are declared with `param` by name, inherited ones first."""
-        return dict(_declared(cls))
+        return dict(_declared(cls))  # type: ignore[arg-type]  # classes can be hashed
 
     @classmethod
     def space(cls, *, online: bool = False) -> tuple[Param, ...]:

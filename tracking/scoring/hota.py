@@ -64,10 +64,11 @@ def unweighted_hota(pairs: Pairs) -> float:
     """Returns HOTA if every frame has the weight 1, to the last bit as `weighted_hota` does. Its time does not
     depend on the length of the sequence."""
     found = Matches(pairs)
-    n, m = (np.bincount(place, minlength=len(ids)) for ids, place in (pairs.true_ids, pairs.est_ids))
-    met = np.bincount(found.link * BINS + found.level, minlength=len(found.true_id) * BINS)
-    counts = (count[None].astype(float) for count in (n, m, met))
-    return float(hota_scores(found.sums(*counts, found.similar[None]))["HOTA"][0])
+    n, m = (
+        np.bincount(place, minlength=len(ids))[None].astype(float) for ids, place in (pairs.true_ids, pairs.est_ids)
+    )
+    met = np.bincount(found.link * BINS + found.level, minlength=len(found.true_id) * BINS)[None].astype(float)
+    return float(hota_scores(found.sums(n, m, met, found.similar[None]))["HOTA"][0])
 
 
 class Matches:
