@@ -43,7 +43,7 @@ from scenarios.schema.schedule import Schedule
 from scenarios.schema.values import Model
 from sim.draws import drawn
 from sim.types import Array
-from tracking.environment.env import TuningEnv
+from tracking.environment.env import Reward, TuningEnv
 from tracking.episodes.episode_cache import SourceCache
 from tracking.episodes.sources import Source, sources
 from tracking.parameter_space import space_of
@@ -140,12 +140,12 @@ class Bench:
         self.base = kind()
         self.still = Policy(self.base, EVERY, MEMORY, {p.name: {} for p in self.space})
 
-    def env(self, scene: Scene) -> TuningEnv:
+    def env(self, scene: Scene, reward: Reward = "window") -> TuningEnv:
         """Returns an environment of one scene."""
         fps = self.cache.open(scene.source).sequence.fps
         return TuningEnv(
             self.tracker, scene.source, detections="file", decision_every=max(round(EVERY * fps), 1), cache=self.cache,
-            tracker_seed=scene.source.seed,
+            tracker_seed=scene.source.seed, reward=reward,
         )  # fmt: skip
 
     def play(self, scene: Scene, policy: Policy, offset: Array | None = None) -> Played:

@@ -56,3 +56,15 @@ class Toy:
         self.pos, self.id, self.next = pos, id, self.next + int(born.sum())
         cov = np.tile(np.eye(4), (n, 1, 1))
         return Tracks(frame.index, frame.t, detections.plane, "person", id, np.full(n, -1), pos, vel, cov)
+
+
+class BoxedToy(Toy):
+    """Reports the boxes in the image, as detectors have them; they are compared where they stand on the ground."""
+
+    needs = ("boxes",)
+
+    def step(self, frame: Frame, detections: Detections | None) -> Tracks:
+        found, box = super().step(frame, detections), detections.box[self.config.skip :]
+        return found.replace(
+            plane="image", pos=box[:, :2] + box[:, 2:] / 2, box=box, vel=np.full((len(box), 2), np.nan)
+        )

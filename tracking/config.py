@@ -12,6 +12,7 @@ import dataclasses
 import os.path
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self, cast
 
@@ -140,8 +141,7 @@ class Config:
     @classmethod
     def params(cls) -> dict[str, Param]:
         """Returns all parameters that are declared with `param` by name, inherited ones first."""
-        found = [f for f in dataclasses.fields(cls) if "param" in f.metadata]
-        return {f.name: dataclasses.replace(f.metadata["param"], name=f.name) for f in found}
+        return dict(_declared(cls))  # type: ignore[arg-type]  # classes can be hashed
 
     @classmethod
     def space(cls, *, online: bool = False) -> tuple[Param, ...]:
@@ -209,6 +209,12 @@ class Config:
     def to_toml(self) -> str:
         """Returns the text of a TOML file from which `from_toml` reads an equal config."""
         return toml_text(self.tracker, self.as_dict())
+
+
+@cache
+def _declared(kind: type[Config]) -> dict[str, Param]:
+    found = [f for f in dataclasses.fields(kind) if "param" in f.metadata]
+    return {f.name: dataclasses.replace(f.metadata["param"], name=f.name) for f in found}
 
 
 def read_params(path: str | Path, tracker: str) -> dict[str, object]:

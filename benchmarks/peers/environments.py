@@ -19,6 +19,9 @@ PACKAGES = {
                  "idna", "certifi", "charset-normalizer"),
     "norfair": ("norfair",),
     "cmaes": ("cmaes",),
+    # pip takes PyTorch's own wheel for CPUs (2.13.0+cpu) where it finds it (its option find-links). The wheel of PyPI
+    # for Linux needs NVIDIA's libraries, which are not among these.
+    "stable-baselines3": ("stable-baselines3", "torch==2.13.0", "sympy", "mpmath"),
     "stonesoup": ("stonesoup", "ordered-set", "rtree", "ruamel.yaml", "pymap3d", "utm"),
 }  # fmt: skip
 OF_TRACKERS = "roboflow", "norfair", "stonesoup"
@@ -43,6 +46,6 @@ def make_environments(folder: Path, libraries: Iterable[str] = OF_TRACKERS) -> d
                 continue
             made.rename(place)
         sys.path.append(str(place))
-        versions = {one.name.lower(): one.version for one in distributions(path=[str(place)])}
+        versions = {one.name.lower().replace("_", "-"): one.version for one in distributions(path=[str(place)])}
         found[library] = f"{packages[0]} {versions[packages[0]]}"
     return found

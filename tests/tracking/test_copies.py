@@ -12,7 +12,11 @@ import pytest
 
 from scenarios.loading.resolve import load
 from sim.sequence import simulate
+from tests.processes import TOY, python
+from tests.toy_tracker import BoxedToy
 from tracking.environment.env import TuningEnv
+from tracking.episodes.episode_cache import SourceCache
+from tracking.episodes.sources import sources
 from tracking.running.prepare import prepare
 from tracking.running.tracker_registry import find, names
 
@@ -51,20 +55,80 @@ def test_a_copied_tracker_goes_on_as_the_original(name, mode):
         assert [content(other.step(f, f.detections)) for f in given[half:]] == on
 
 
-@pytest.mark.parametrize("detections", ["file", "image"])
-@pytest.mark.parametrize("name", ["blob", "relational"])
-def test_a_copied_environment_goes_on_as_the_original(name, detections):
-    settings = ["camera.fps=5", "duration=4", "camera.image=[320,240]"]
-    env = TuningEnv(name, "cross", seeds=[3], set=settings, detections=detections, decision_every=4)
-    env.reset(seed=0)
-    middle = np.zeros(env.action_space.shape)
-    for _ in range(2):
-        env.step(middle)
-    other = copy.deepcopy(env)
-    on = [env.step(middle) for _ in range(3)]
-    for (seen, reward, ended, _, info), (seen2, reward2, ended2, _, info2) in zip(
-        on, [other.step(middle) for _ in range(3)], strict=True
-    ):
+def pickled(env):
+    return pickle.loads(pickle.dumps(env))
+
+
+def environment(tracker, **options):
+    settings = ["camera.fps=5", "duration=3", "camera.image=[160,120]"]
+    return TuningEnv(
+        tracker, ("cross", "pass-by"), **{"seeds": range(2), "set": settings, "decision_every": 4, **options}
+    )
+
+
+ENVIRONMENTS = [
+    *((name, {}) for name in names()), (TOY, {}), (BoxedToy, {"reward": "prefix"}), ("blob", {"decision_every": None}),
+    *((name, {"detections": "image"}) for name in ("blob", "group-pda", "relational")),
+    ("blob", {"actions": "presets", "presets": [{"coast_time": 0.7}, {}]}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, pickled])
+@pytest.mark.parametrize(("tracker", "options"), ENVIRONMENTS)
+def test_a_copied_environment_goes_on_as_the_original(tracker, options, copied):
+    """To the end of the episode and through the next one."""
+    env = environment(tracker, **options)
+    env.action_space.seed(1)
+    env.reset(seed=2)
+    drawn = [env.action_space.sample() for _ in range(9)]
+    actions = drawn if env.actions == "presets" else [0.4 * action for action in drawn]
+    if env.decision_every is not None:
+        env.step(actions.pop())
+    runs, ended = [], 0
+    for one in (env, copied(env)):
+        runs.append([])
+        for action in actions:
+            runs[-1].append(one.step(action))
+            if runs[-1][-1][2]:
+                ended += 1
+                runs[-1].append((one.reset()[0],))
+    assert ended >= 4
+    for (seen, *others), (seen2, *others2) in zip(*runs, strict=True):
         assert np.array_equal(seen, seen2)
-        assert (reward, ended, info["frame"]) == (reward2, ended2, info2["frame"])
-    assert on[-1][-1]["frame"] == 20
+        assert others == others2
+
+
+GOES_ON = """
+import pickle, sys
+env = pickle.load(open(sys.argv[1], "rb"))
+seen, reward, *_ = env.step(0 * env.action_space.sample())
+print(seen.tobytes().hex(), reward)
+"""
+
+
+@pytest.mark.parametrize("tracker", ["blob", TOY])
+def test_an_episode_goes_on_in_another_process(tracker, tmp_path):
+    env = environment(tracker)
+    env.reset(seed=3)
+    for _ in range(2):
+        (tmp_path / "env").write_bytes(pickle.dumps(env))
+        done = python("-c", GOES_ON, tmp_path / "env")
+        seen, reward, *_ = env.step(np.zeros(env.action_space.shape, np.float32))
+        assert done.stdout.split() == [seen.tobytes().hex(), str(reward)], done.stderr
+
+
+def test_the_cache_of_a_copy():
+    """A deep copy shares it; a pickled one has the same limit and is empty."""
+    env = environment("blob", cache=2**20)
+    env.reset(seed=3)
+    assert copy.deepcopy(env).cache is env.cache
+    assert (pickled(env).cache.limit, len(pickled(env).cache)) == (2**20, 0)
+
+
+def test_what_is_made_of_a_kept_sequence_is_not_taken_for_it():
+    kept = SourceCache().open(*sources("cross", [3]))
+    assert pickled(kept.sequence).truth.pos.tobytes() == kept.truth.pos.tobytes()
+    other = replace(kept.sequence, name="other")
+    assert copy.copy(other).name == "other"
+    with pytest.raises((AttributeError, pickle.PicklingError), match="local"):
+        pickle.dumps(other)

@@ -66,7 +66,8 @@ def shared_difference(first: Array, second: Array) -> tuple[Array, float] | None
     if min(len(first), len(second)) < LEAST_BOXES:
         return None
     away = second[None, :, :2] - first[:, None, :2]
-    alike = np.abs(np.log(second[None, :, 2] / first[:, None, 2])) <= ALIKE
+    with np.errstate(invalid="ignore", divide="ignore"):  # a predicted box of no height is like no other
+        alike = np.abs(np.log(second[None, :, 2] / first[:, None, 2])) <= ALIKE
     rows, columns = np.nonzero(alike & (np.abs(away).max(axis=2) <= REACH * first[:, 2, None]))
     compared = len(np.unique(rows))
     if compared < LEAST_BOXES:

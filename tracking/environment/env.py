@@ -185,12 +185,14 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
         if self.decision_every is None:
             rollout, first = self._decided(action, self._rollout), 1
             self.rollout, self.config = rollout, cast(Config, rollout.config)
+            rollout.prepared.planes.off = self.config != self.base
             terminated = self._advance(rollout, None)
         else:
             assert self.rollout is not None
             rollout, config = self.rollout, self._decided(action, lambda config: config)
             config = self.config if config == self.config else config  # trackers keep what they derive of it
             first = len(rollout.tracks) + 1
+            rollout.prepared.planes.off |= config != self.base
             terminated = self._advance_with(rollout, config, len(rollout.tracks) + self.decision_every)
         self._over = terminated
         reward = self._rewarded(rollout, first, terminated)

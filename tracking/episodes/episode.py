@@ -111,7 +111,7 @@ class Rollout:
         streams = streams_for(self.tracker, self.detections)
         open_source = OpenedSource if self.cache is None else self.cache.open
         self.opened: OpenedSource = open_source(self.source, streams)
-        self.truth: Truth = self.opened.truth
+        _ = self.truth  # a source without labels cannot be played
         self.prepared = prepare(
             self.tracker, self.sequence, params=self.config, detections=self.detections, seed=self.tracker_seed,
             inputs=self.opened.input_frames,
@@ -121,6 +121,7 @@ class Rollout:
         self.prepared.reset(self.tracker_seed)
         self.seconds_tracking = time.perf_counter() - start
         self._completion, self._completed = self.prepared.completion(objective=True), list[Tracks]()
+        self._standing = list[Tracks]()  # `_completed` on the ground, as far as this was needed
         self._fed = 0
         self._frames: Iterator[Frame] | None = None
         self._next: Frame | None = None
@@ -133,6 +134,11 @@ class Rollout:
     def sequence(self) -> Sequence:
         """The opened sequence that is played."""
         return self.opened.sequence
+
+    @property
+    def truth(self) -> Truth:
+        """The labels of the sequence."""
+        return self.opened.truth
 
     @property
     def length(self) -> int:
@@ -178,12 +184,27 @@ class Rollout:
         window = tracks[first - 1 :]
         if any(t.groups is None for t in window):
             window = tracks  # groups are derived from earlier frames, too
+        elif tracks is self._completed:
+            window = self._placed(first)
         return self._scores(window, range(first, len(self.tracks) + 1), every=False).get("objective", float("nan"))
 
     def _grouped(self) -> SequenceOf[Tracks]:
         self._completed += self._completion.add(self.tracks[self._fed :])
         self._fed = len(self.tracks)
         return self._completed
+
+    def _placed(self, first: int) -> SequenceOf[Tracks]:
+        """Returns the completed tracks from the frame `first` on, where they stand if they are compared there. Windows
+        overlap by their margins, and to find where boxes stand takes most of the time that it takes to score them."""
+        from tracking.grouping.foot_points import standing
+        from tracking.scoring.ground_or_image import stands
+
+        window, truth = self._completed[first - 1 :], self.opened.scorer.truth
+        if not stands(truth, window, self.prepared.input, self.similarity):
+            return window
+        assert truth.camera is not None
+        self._standing += standing(self._completed[len(self._standing) :], truth.camera, truth.scene)
+        return self._standing[first - 1 :]
 
     def _whole(self, every: bool) -> SequenceOf[Tracks]:
         from tracking.grouping.foot_points import completed

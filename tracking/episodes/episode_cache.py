@@ -1,5 +1,9 @@
 """Keeps opened sequences between episodes on the same sources, so that motions, truths and detections are computed
 once. The memory is bounded by the bytes of the arrays that they hold.
+
+What is kept can be computed again, and a sequence consists of functions, which cannot be pickled. So a pickled opened
+source is its source alone, and is opened again where it is loaded; a pickled cache is empty. `copy.deepcopy` shares
+both.
 """
 
 from __future__ import annotations
@@ -7,12 +11,12 @@ from __future__ import annotations
 import pickle
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache, cached_property
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from scenarios.errors import InputError
-from sim.types import DetectionMode, Frame, Truth
+from sim.types import DetectionMode, Frame, Sequence, Truth
 from tracking.episodes.sources import Source
 
 if TYPE_CHECKING:
@@ -68,13 +72,23 @@ class SourcePeople:
         return self._scorer
 
 
+class KeptSequence(Sequence):
+    """The sequence of an opened source, `opened`."""
+
+    opened: OpenedSource
+
+    def __reduce_ex__(self, protocol: Any) -> str | tuple[Any, ...]:
+        own = "opened" in vars(self)  # not so what `dataclasses.replace` makes of it
+        return (getattr, (self.opened, "sequence")) if own else super().__reduce_ex__(protocol)
+
+
 class OpenedSource:
     """A source whose sequence is open; its detections, truth and background are kept after their first use. streams:
     the pictures that are drawn if the source is simulated, some of "left", "right" and "background". people: of another
     source with the same people_key."""
 
     def __init__(self, source: Source, streams: tuple[str, ...] = (), people: SourcePeople | None = None) -> None:
-        self.source, self.people, self.kept = source, people or SourcePeople(source), Kept()
+        self.source, self.streams, self.people, self.kept = source, streams, people or SourcePeople(source), Kept()
         found = source.open(streams, self.people.motion)
         if self.people.load_truth is None and found.load_truth is not None:
             self.people.load_truth = self.people.kept.once(found.load_truth)
@@ -87,8 +101,16 @@ class OpenedSource:
 
         pictures = opened.has_images or opened.has_right
         frames = opened.frames if pictures else frames_without_pictures
-        self.sequence = replace(opened, bare=frames_without_pictures, frames=frames)
+        values = {each.name: getattr(opened, each.name) for each in fields(opened)}
+        self.sequence = KeptSequence(**values | {"bare": frames_without_pictures, "frames": frames})
+        object.__setattr__(self.sequence, "opened", self)
         self._inputs: dict[tuple[object, ...], InputFrames] = {}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return OpenedSource, (self.source, self.streams)
+
+    def __deepcopy__(self, memo: object) -> OpenedSource:
+        return self
 
     @cached_property
     def truth(self) -> Truth:
@@ -124,6 +146,12 @@ class SourceCache:
     def __init__(self, limit: int = DEFAULT_LIMIT) -> None:
         self.limit = limit
         self._opened: OrderedDict[tuple[object, ...], OpenedSource] = OrderedDict()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return SourceCache, (self.limit,)
+
+    def __deepcopy__(self, memo: object) -> SourceCache:
+        return self
 
     def __len__(self) -> int:
         return len(self._opened)

@@ -41,20 +41,24 @@ VIEW = 1.0  # widths and heights of the picture by which a person may be outside
 class PlaneCheck:
     """The comparison of a tracker's first answers with its input in one sequence.
 
-    State: compared, fitting, numbers of rows; points (K, 2): the last detections on the ground, m.
+    State: compared, fitting, numbers of rows; points (K, 2): the last detections on the ground, m; off, True if nothing
+    is compared, as parameters were changed meanwhile: with bad ones a tracker may be far from everybody from the start.
     """
 
     compared: int = 0
     fitting: int = 0
     points: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    off: bool = False
 
     def clear(self) -> None:
         """Forgets everything, for the start of another sequence."""
         self.compared = self.fitting = 0
-        self.points = np.zeros((0, 2))
+        self.points, self.off = np.zeros((0, 2)), False
 
     def check(self, t: Tracks, given: Detections | None, context: Context, tracker: str, sequence: str) -> None:
         """Compares the answer of a frame. Raises WorkError if the answers so far lie elsewhere than they say."""
+        if self.off:
+            return
         later = self.fitting >= max(FITTING, self.compared / 2)
         if later and (t.index % AGAIN or given is None or t.plane != "ground" or not len(self.points)):
             return

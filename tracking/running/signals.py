@@ -12,6 +12,7 @@ the detection's own noise, which no tracker reports, is left out of it, so a lar
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -126,7 +127,8 @@ class Signals:
                 self._found[id] = now
         self._residuals += np.square(far[row, column]).tolist()
         known = (variance[column] > 0).all(axis=1)
-        self._nis += (np.square(off[row, column][known]) / variance[column][known]).mean(axis=1).tolist()
+        with np.errstate(over="ignore"):  # a variance may come near 0
+            self._nis += (np.square(off[row, column][known]) / variance[column][known]).mean(axis=1).tolist()
         if len(row) >= COMMON:
             common = np.median(off[row, column], axis=0)
             self._shifts.append(float(np.square(common).sum()))
@@ -221,4 +223,6 @@ def _share_in_groups(tracks: list[Tracks]) -> float:
 
 def squashed(statistic: Statistic, value: float) -> float:
     """Returns the value of a statistic mapped to [0, 1]: a share as it is, another value x as x / (x + half)."""
-    return value if statistic.half is None else value / (value + statistic.half)
+    if statistic.half is None:
+        return value
+    return 1.0 if value == math.inf else value / (value + statistic.half)

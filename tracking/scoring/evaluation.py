@@ -26,7 +26,7 @@ from tracking.scoring.frame_weights import FrameScores, WeightedScores, mean_of_
 from tracking.scoring.ground_or_image import grounded, in_one_plane, plane_of
 from tracking.scoring.group_rows import TrueGroups, tracked_groups, true_groups
 from tracking.scoring.groups import GroupMatch, f1, groups_found, shared_members, weighted_groups
-from tracking.scoring.hota import hota_scores, hota_sums, weighted_hota
+from tracking.scoring.hota import hota_scores, hota_sums, unweighted_hota
 from tracking.scoring.identity import weighted_identity
 from tracking.scoring.matching import mapped_people
 from tracking.scoring.membership import weighted_membership
@@ -41,6 +41,7 @@ from tracking.scoring.people import (
     true_people,
 )
 from tracking.scoring.position_errors import weighted_positions
+from tracking.scoring.rows import span
 from tracking.scoring.similarity import Pairs
 from tracking.scoring.unscored_tracks import left_out
 
@@ -125,10 +126,10 @@ class MatchedSides:
 
     def objective_scores(self) -> dict[str, float]:
         """Returns HOTA, group_F1 and objective as `scores` does, by key, in a tenth of the time."""
-        found, size = {"HOTA": math.nan, "group_F1": math.nan}, len(self.sides.inside)
+        found = {"HOTA": math.nan, "group_F1": math.nan}
         if self.people is not None:
             self.people.require_unique_ids()
-            found["HOTA"] = unweighted(weighted_hota(self.people, size), size)["HOTA"]
+            found["HOTA"] = unweighted_hota(self.people)
         if self.groups is not None and (tracked := tracked_groups(self.sides)).known:
             true, est = self.groups.groups, tracked.counted
             shared = shared_members(true, est, tracked.person, len(self.sides.true.rows))
@@ -245,8 +246,9 @@ class Scorer:
     def sides(self, tracks: Sequence[Tracks], frames: Bools) -> ComparedSides:
         """Returns the data of truth and tracks in the frames f where frames[f] is true, without the tracked people that
         the labels leave out. No tracked person is mapped to a true person yet."""
-        kept = frames[self.people.rows.frame]
-        true = self.people if kept.all() else self.people.keep(kept)
+        true = self.people.keep(span(self.people.rows.frame, frames))
+        kept = frames[true.rows.frame]
+        true = true if kept.all() else true.keep(kept)
         est, plane = tracked_people(tracks), plane_of(self.truth, tracks)
         out = left_out(self.truth, est)
         est = est.keep(~out) if out.any() else est
@@ -279,7 +281,7 @@ class Scorer:
         if not sides.groups_only:
             pairs = people_pairs(sides, similarity)
             sides = replace(sides, mapping=mapped_people(pairs))
-        groups = self.groups(sides.surface).in_frames(inside, inside[self.people.rows.frame]) if labelled else None
+        groups = self.groups(sides.surface).in_frames(inside, self.people.rows) if labelled else None
         return MatchedSides(sides, similarity, pairs, groups, self.annotated.step)
 
 

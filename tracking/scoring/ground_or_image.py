@@ -67,6 +67,13 @@ def in_one_plane(
     return moved, "boxes" if by_overlap else "image"
 
 
+def stands(truth: Truth, run: Sequence[Tracks], source: str | None, similarity: Similarity | None) -> bool:
+    """Returns True if `in_one_plane` returns a run, compared alone, as `standing` moves it to the ground."""
+    if similarity == "image" or truth.camera is None or (similarity != "ground" and truth.pos is None):
+        return False
+    return can_stand(run, truth.camera, None if similarity == "ground" else source)
+
+
 def _on_ground(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:
     if truth.camera is None or not can_stand(run, truth.camera):
         return run

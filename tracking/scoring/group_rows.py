@@ -14,7 +14,7 @@ import numpy as np
 from sim.geometry.polygons import edge_distance_pairs, gap_pairs, pack, pack_padded
 from sim.types import Array, Bools, Groups, Ints, Truth
 from tracking.scoring.people import ComparedSides, Surface
-from tracking.scoring.rows import FrameRows, find_rows
+from tracking.scoring.rows import FrameRows, find_rows, span
 from tracking.scoring.similarity import compare
 
 INSIDE = 0.3  # m: a person at most this far from a hull is a member, where a tracker names no members
@@ -49,6 +49,14 @@ class GroupRows:
             place[self.of[kept]], self.member[kept],
         )  # fmt: skip
 
+    def part(self, rows: slice) -> GroupRows:
+        """Returns the groups in a slice of the rows, from `start` to `stop`, with their memberships."""
+        first, end = np.searchsorted(self.of, (rows.start, rows.stop)).tolist()  # `of` ascends
+        own = slice(first, end)
+        return GroupRows(
+            self.rows.keep(rows), self.pos[rows], self.hull[rows], self.of[own] - rows.start, self.member[own]
+        )
+
 
 def group_rows(frames: Ints, groups: Sequence[Groups], people: FrameRows) -> GroupRows:
     """Returns the groups of F frames as rows; frames (F,) gives the frame number of each element of `groups`. The
@@ -77,12 +85,16 @@ class TrueGroups:
     # the other surface.
     comparable: bool
 
-    def in_frames(self, frames: Bools, people: Bools) -> TrueGroups:
-        """Returns the groups of the frames f where frames[f] is true. people (R,), bool: which true people are kept;
-        members become row indices of the kept ones."""
-        groups = self.groups.keep(frames[self.groups.rows.frame])
-        number = np.append(np.cumsum(people) - 1, -1)  # the last element keeps -1, an unknown member
-        return TrueGroups(replace(groups, member=number[groups.member]), self.comparable)
+    def in_frames(self, frames: Bools, people: FrameRows) -> TrueGroups:
+        """Returns the groups of the frames f where frames[f] is true. people: all true people; members become row
+        indices of those in these frames."""
+        groups, here = self.groups.part(span(self.groups.rows.frame, frames)), span(people.frame, frames)
+        groups = groups.keep(frames[groups.rows.frame])
+        number = np.append(
+            np.cumsum(frames[people.frame[here]]) - 1, -1
+        )  # the last element keeps -1, an unknown member
+        member = np.where(groups.member < 0, -1, groups.member - here.start)
+        return TrueGroups(replace(groups, member=number[member]), self.comparable)
 
 
 def true_groups(truth: Truth, labelled: Bools, people: FrameRows, surface: Surface) -> TrueGroups:

@@ -21,6 +21,7 @@ from tracking.scoring.matching import match_as_table
 from tracking.scoring.similarity import EPS, Pairs
 
 ALPHAS = np.arange(0.05, 0.99, 0.05)
+BINS = len(ALPHAS) + 1  # numbers of thresholds at which a match can count
 CELLS = 2_000_000  # numbers of matches held at once
 LEAST = 1e-10  # keeps LocA at 1 where nothing is matched
 
@@ -39,36 +40,64 @@ def hota_sums(pairs: Pairs, size: int) -> Callable[[Array], Array]:
     The rows are TP, true rows, estimated rows, the sums over matches of AssA, AssRe and AssPr, and the sum of
     similarities. Sums of several sequences add up. One matching serves all thresholds and all weights: in each frame
     the one with the greatest sum of A(i, j) s(i, j)."""
-    true_id, est_id, link = pairs.links
-    n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # n_i of each link
-    m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[est_id]
-    chosen = match_as_table(pairs, alignment(pairs, n + m)[link] * pairs.s)
-    frame, s, bins = pairs.frame[chosen], pairs.s[chosen], len(ALPHAS) + 1
-    level = np.searchsorted(ALPHAS - EPS, s, side="right")  # number of thresholds, the lowest, at which a match counts
-    used, link = np.unique(link[chosen], return_inverse=True)
-    true_id, est_id = true_id[used], est_id[used]
+    found = Matches(pairs)
+    frame, s, level, bins = found.frame, found.s, found.level, BINS
     true_rows = bin_sums(pairs.true.frame, pairs.true_ids[1], len(pairs.true_ids[0]), size)
     est_rows = bin_sums(pairs.est.frame, pairs.est_ids[1], len(pairs.est_ids[0]), size)
-    met = bin_sums(frame, link * bins + level, len(used) * bins, size)
+    met = bin_sums(frame, found.link * bins + level, len(found.true_id) * bins, size)
     # The sums of similarity at each threshold.
     near = np.column_stack([np.bincount(frame, np.where(level >= k, s, 0.0), size) for k in range(1, bins)])
-    total = _reached(np.bincount(level, weights=s, minlength=bins).astype(float))
 
     def sums(weights: Array) -> Array:
-        rows = max(1, CELLS // max(1, len(used) * bins))
+        rows = max(1, CELLS // max(1, len(found.true_id) * bins))
         parts = [of_part(weights[k : k + rows]) for k in range(0, len(weights), rows)]
         return np.concatenate([np.zeros((0, 7, len(ALPHAS))), *parts])
 
     def of_part(weights: Array) -> Array:
-        n, m = true_rows(weights), est_rows(weights)
-        together = _reached(met(weights).reshape(len(weights), len(used), bins))  # (D, U, 19): matches of each link
-        similar = total + (weights - 1) @ near
-        own, other = n[:, true_id, None], m[:, est_id, None]
+        similar = found.similar + (weights - 1) @ near
+        return found.sums(true_rows(weights), est_rows(weights), met(weights), similar)
+
+    return sums
+
+
+def unweighted_hota(pairs: Pairs) -> float:
+    """Returns HOTA if every frame has the weight 1, to the last bit as `weighted_hota` does. Its time does not
+    depend on the length of the sequence."""
+    found = Matches(pairs)
+    n, m = (
+        np.bincount(place, minlength=len(ids))[None].astype(float) for ids, place in (pairs.true_ids, pairs.est_ids)
+    )
+    met = np.bincount(found.link * BINS + found.level, minlength=len(found.true_id) * BINS)[None].astype(float)
+    return float(hota_scores(found.sums(n, m, met, found.similar[None]))["HOTA"][0])
+
+
+class Matches:
+    """The matches of true and estimated rows, K of them, of U combinations of ids.
+
+    State: frame, s, level (K,), frame number, similarity and number of thresholds, the lowest, at which a match counts;
+    link (K,), its combination; true_id, est_id (U,), indices of the ids of each combination; similar (19,), sum of the
+    similarities at each threshold.
+    """
+
+    def __init__(self, pairs: Pairs) -> None:
+        true_id, est_id, link = pairs.links
+        n = np.bincount(pairs.true_ids[1], minlength=len(pairs.true_ids[0]))[true_id]  # n_i of each link
+        m = np.bincount(pairs.est_ids[1], minlength=len(pairs.est_ids[0]))[est_id]
+        chosen = match_as_table(pairs, alignment(pairs, n + m)[link] * pairs.s)
+        self.frame, self.s = pairs.frame[chosen], pairs.s[chosen]
+        self.level = np.searchsorted(ALPHAS - EPS, self.s, side="right")
+        used, self.link = np.unique(link[chosen], return_inverse=True)
+        self.true_id, self.est_id = true_id[used], est_id[used]
+        self.similar = _reached(np.bincount(self.level, weights=self.s, minlength=BINS).astype(float))
+
+    def sums(self, n: Array, m: Array, met: Array, similar: Array) -> Array:
+        """Returns the sums (D, 7, 19) of `hota_sums` from the weighted numbers of rows of each true id (D, N), of each
+        estimated id (D, M), and of matches by combination and level (D, U * 20), and the similarities (D, 19)."""
+        together = _reached(met.reshape(len(met), len(self.true_id), BINS))  # (D, U, 19): matches of each link
+        own, other = n[:, self.true_id, None], m[:, self.est_id, None]
         ass = [_share(together * together, of).sum(axis=1) for of in (own + other - together, own, other)]
         rows = np.broadcast_arrays(n.sum(axis=1)[:, None], m.sum(axis=1)[:, None], similar)
         return np.stack([together.sum(axis=1), *rows[:2], *ass, similar], axis=1)
-
-    return sums
 
 
 def _reached(by_level: Array) -> Array:

@@ -34,6 +34,15 @@ class FrameRows:
             raise ValueError(f"{side}: id {again.id[k]} is twice in frame {again.frame[k]}")
 
 
+def span(frame: Ints, frames: Bools) -> slice:
+    """Returns which rows, sorted by frame number (R,), lie between the first and the last frame f where frames[f] is
+    true; no row if there is none."""
+    inside = np.flatnonzero(frames)
+    if not len(inside):
+        return slice(0, 0)
+    return slice(*np.searchsorted(frame, (inside[0], inside[-1] + 1)).tolist())
+
+
 def numbered(values: Ints) -> tuple[Ints, Ints]:
     """Returns the distinct values, ascending, and the index of each value among them. The result is that of
     `numpy.unique(values, return_inverse=True)`. Where the range of values is small, counting replaces sorting."""

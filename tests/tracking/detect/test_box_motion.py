@@ -36,6 +36,8 @@ def test_what_most_boxes_share_is_found_among_those_of_others() -> None:
     assert found[1] < 3
     assert shared_difference(first[:2], second[:2]) is None
     assert shared_difference(none(), second) is None
+    empty = np.concatenate([first, first[:1] * [1, 1, 0, 1], first[:1] * [1, 1, -1, 1]])
+    assert np.array_equal(shared_difference(empty, second)[0], found[0]), "boxes of no height"
 
 
 @pytest.mark.parametrize("together", [True, False])

@@ -268,3 +268,11 @@ def test_bounds_and_kind(plane: Any) -> None:
             assert seen.dtype == np.float32
             assert seen.shape == (len(STATISTICS),)
             assert ((seen >= 0) & (seen <= 1)).all()
+
+
+def test_a_covariance_near_zero_is_a_very_unlikely_residual() -> None:
+    """The NIS overflows; its statistic is the greatest there is, and no nan."""
+    signals = Signals(FPS)
+    for k in (1, 2):
+        signals.add(frame(k, [[0.1, 0.0]]), tracks(k, [[0.0, 0.0]], (0.0, 0.0), cov=1e-314 * np.eye(4)[None]))
+    assert dict(zip(NAMES, signals.statistics(float("nan")).tolist(), strict=True))["nis"] == 1.0

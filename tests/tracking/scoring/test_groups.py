@@ -148,9 +148,13 @@ def test_in_the_image_the_hulls_of_the_image_are_compared():
 
 
 def test_members_are_renumbered_and_unknown_ones_stay_unknown():
-    true = truth([Scene(APART, {1: ((1, 2), None), 2: ((3, 9), (0, 0, 2, 1))})])
-    people = true_people(true, np.ones(2, bool))
-    groups = true_groups(true, np.array([False, True]), people.rows, "ground")
-    assert groups.groups.member.tolist() == [0, 1, 2, -1]
-    kept = groups.in_frames(np.ones(2, bool), np.array([False, *[True] * (len(people.rows) - 1)]))
-    assert kept.groups.member.tolist()[1:] == [0, 1, -1]
+    scene = Scene(APART, {1: ((1, 2), None), 2: ((3, 9), (0, 0, 2, 1))})
+    true, n = truth([scene] * 4), len(APART)
+    people = true_people(true, np.ones(5, bool))
+    groups = true_groups(true, np.arange(5) > 0, people.rows, "ground")
+    assert groups.groups.member.tolist() == [k + m if m >= 0 else -1 for k in range(0, 4 * n, n) for m in (0, 1, 2, -1)]
+    for frames, starts in (((2, 4), (0, n)), ((3,), (0,)), ((1, 2, 3, 4), range(0, 4 * n, n)), ((), ())):
+        kept = groups.in_frames(np.isin(np.arange(5), frames), people.rows).groups
+        assert kept.member.tolist() == [k + m if m >= 0 else -1 for k in starts for m in (0, 1, 2, -1)]
+        assert kept.rows.frame.tolist() == np.repeat(frames, 2).tolist()
+        assert (kept.count.tolist(), len(kept.hull)) == ([2] * len(kept), len(kept))

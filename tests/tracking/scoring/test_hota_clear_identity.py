@@ -9,7 +9,7 @@ from tests.matrix_pairs import matrix_pairs
 from tests.reference_trackeval import trackeval_scores
 from tracking.scoring.evaluation import weighted_people
 from tracking.scoring.frame_weights import unweighted
-from tracking.scoring.hota import hota_sums
+from tracking.scoring.hota import hota_sums, unweighted_hota
 
 SEEDS = range(15)
 
@@ -30,6 +30,7 @@ def random_case(seed: int, values=None, crowd: int = 9):
 def assert_equal_to_trackeval(true, est, similarity, pairs=None) -> None:
     pairs = pairs or matrix_pairs(true, est, similarity)
     found = unweighted(weighted_people(pairs, pairs.size, hota_sums(pairs, pairs.size)), pairs.size)
+    assert unweighted_hota(pairs) == found["HOTA"], "to the last bit"
     assert found == pytest.approx(trackeval_scores(true, est, similarity), abs=1e-9)
 
 

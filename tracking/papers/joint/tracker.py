@@ -41,7 +41,7 @@ class Joint(PointTracker):
     Made from a config; None: the defaults. State: config, which may be replaced between two frames; nested, the
     particles after step 2; people, the tracked people; newcomers, people who are not confirmed yet; groups, the people
     of each reported group, by id; events, which makes the events; belief, of pairs; streams, the random numbers; shown
-    (K, 4), boxes of the people reported last, px, or None.
+    (K, 4), boxes of the people reported last, px, or None; reported, the ids of all people reported so far.
     """
 
     config_class: ClassVar[type[JointConfig]] = JointConfig
@@ -58,6 +58,7 @@ class Joint(PointTracker):
         self.nested = Nested.empty((c.particles, c.partitions), STATE)
         self.people, self.newcomers = People(), Newcomers()
         self.groups: Members = {}
+        self.reported = set[int]()
         self.events = ReportedEvents(context.fps)
         self.belief = PairBelief(context.fps, EVENTS)
         self.streams = PersonStreams(seed)
@@ -155,6 +156,9 @@ class Joint(PointTracker):
         self.groups = self.events.people.identities.name(frame.index, parts, self.groups)
         shown = self.people.existence >= REPORTED
         id, group, mean, cov = id[shown], report.known_groups(self.groups, id[shown]), mean[shown], cov[shown]
+        self.reported.update(id.tolist())
+        # a person may be confirmed, missed and forgotten without being reported
+        events = tuple(e for e in events if self.reported.issuperset(e.members))
         pos, vel, cov = mean[:, :2] * self.unit, mean[:, 2:] * self.unit, cov * self.unit**2
         self.shown = boxes_at(pos, self.people.size[shown]) if self.plane == "image" else None
         return Tracks(

@@ -7,6 +7,7 @@ import pytest
 
 from sim.types import Context, Frame
 from tests.point_frames import FPS, detections, stepped
+from tracking.environment.env import TuningEnv
 from tracking.papers.joint.config import JointConfig
 from tracking.papers.joint.individuals import process_noise
 from tracking.papers.joint.tracker import Joint
@@ -151,3 +152,18 @@ def test_a_new_person_goes_on_in_frames_without_a_detector():
     shown = stepped(tracker, [*frames[:2], None, None, None, *frames[5:8]])
     assert [len(t.id) for t in shown] == [0] * 6 + [1, 1]
     assert shown[-1].vel[0, 0] == pytest.approx(1.3, abs=0.35)
+
+
+@pytest.mark.parametrize("drawn", [1, 6, 16])
+def test_events_name_only_people_who_were_reported(drawn):
+    """Where parameters jump between the ends of their ranges, some are confirmed, missed and forgotten at once."""
+    rng = np.random.default_rng((7, drawn))
+    every = int(rng.choice([1, 3]))
+    env = TuningEnv("joint", "merge", seeds=[30_000 + drawn % 5], set=["camera.fps=5"], decision_every=every)
+    env.reset(seed=0)
+    for _ in range(45 // every):
+        env.step(rng.choice([-1.0, 1.0], env.action_space.shape))
+    reported = set[int]()
+    for tracks in env.rollout.tracks:
+        reported |= set(tracks.id.tolist())
+        assert reported.issuperset(person for event in tracks.events for person in event.members)
