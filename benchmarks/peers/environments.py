@@ -9,6 +9,7 @@ from __future__ import annotations
 import shutil
 import subprocess
 import sys
+from collections.abc import Sequence
 from importlib.metadata import distributions
 from pathlib import Path
 
@@ -23,22 +24,25 @@ DEFAULT = Path.home() / ".cache" / "flockscope" / "peers"
 
 
 def make_environments(folder: Path) -> dict[str, str]:
-    """Installs what is not there yet and puts it at the end of the search path of modules.
+    """Installs all libraries that are not there yet, and returns the name and version of each, as `make_environment`
+    does."""
+    return {library: make_environment(folder, library, packages) for library, packages in PACKAGES.items()}
 
-    Returns the name and version of each library, "" for one that pip cannot install; pip's reason goes to stderr.
+
+def make_environment(folder: Path, library: str, packages: Sequence[str]) -> str:
+    """Installs packages into a folder of their own if they are not there yet, and puts it at the end of the search path
+    of modules.
+
+    Returns the name and version of the first package, "" if pip cannot install it; pip's reason goes to stderr.
     """
-    found = {}
-    for library, packages in PACKAGES.items():
-        place = folder / library
-        if not place.is_dir():
-            made = folder / f"{library}.unfinished"
-            shutil.rmtree(made, ignore_errors=True)
-            line = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", str(made), *packages]
-            if subprocess.run(line, stdout=subprocess.DEVNULL, check=False).returncode:
-                found[library] = ""
-                continue
-            made.rename(place)
-        sys.path.append(str(place))
-        versions = {one.name.lower(): one.version for one in distributions(path=[str(place)])}
-        found[library] = f"{packages[0]} {versions[packages[0]]}"
-    return found
+    place = folder / library
+    if not place.is_dir():
+        made = folder / f"{library}.unfinished"
+        shutil.rmtree(made, ignore_errors=True)
+        line = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--target", str(made), *packages]
+        if subprocess.run(line, stdout=subprocess.DEVNULL, check=False).returncode:
+            return ""
+        made.rename(place)
+    sys.path.append(str(place))
+    versions = {one.name.lower(): one.version for one in distributions(path=[str(place)])}
+    return f"{packages[0]} {versions[packages[0]]}"
