@@ -12,7 +12,7 @@ ours               moved parents and every fourth trial by TPE; trials that sure
 ours whole         the same, no trial is stopped
 ours by Optuna     the same, stopped by Optuna's WilcoxonPruner
 moved              moved parents only, no trial is stopped
-TPE, TPE joint     Optuna's TPESampler, univariate and multivariate; no trial is stopped
+TPE, TPE single    Optuna's TPESampler, as it is (multivariate) and univariate; no trial is stopped
 TPE stopped        TPE, stopped by the search's own rule
 TPE by Optuna      TPE, stopped by Optuna's WilcoxonPruner
 CMA-ES             Optuna's CmaEsSampler from the defaults on; categorical parameters are drawn at random
@@ -165,7 +165,7 @@ METHODS: dict[str, tuple[tuple[Replacement, ...], float]] = {
     "ours by Optuna": ((BY_OPTUNA,), TuneOptions.prune),
     "moved": (((sampler, "TPE_FROM", float("inf")),), 0.0),
     "TPE": ((by(lambda plan, seed: TPESampler(seed=seed)),), 0.0),
-    "TPE joint": ((by(lambda plan, seed: TPESampler(seed=seed, multivariate=True)),), 0.0),
+    "TPE single": ((by(lambda plan, seed: TPESampler(seed=seed, multivariate=False)),), 0.0),
     "TPE stopped": ((by(lambda plan, seed: TPESampler(seed=seed)),), TuneOptions.prune),
     "TPE by Optuna": ((by(lambda plan, seed: TPESampler(seed=seed)), BY_OPTUNA), TuneOptions.prune),
     "CMA-ES": ((by(cma_es),), 0.0),
