@@ -1,7 +1,7 @@
 """What does a search reach with its own sampler and stopping rule, and what with Optuna's, in equal CPU time?
 
-    python -m benchmarks samplers [METHOD …] [--trackers …] [--suites …] [--searches 0:2] [--trials 30]
-                                  [--state FILE.json] [--libraries FOLDER]
+    python -m benchmarks samplers [METHOD …] [--trackers …] [--suites …] [--searches 0:2] [--training 2]
+                                  [--trials 30] [--state FILE.json] [--libraries FOLDER]
 
 Each search tunes one tracker on one suite of short scenes, at 2.5 frames/s. Search k has training scenes and test
 scenes of its own. All methods begin with the defaults and get the same budget: the CPU seconds in which the search's
@@ -30,7 +30,7 @@ import time
 import warnings
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -61,10 +61,10 @@ TRACKERS: dict[str, tuple[str | type[Tracker], tuple[str, ...]]] = {
     "blob": ("blob", ()), "group-pda": ("group-pda", ()), "relational": ("relational", ("particles=50",)),
     "stereo": ("stereo", ()), "Follower": (Follower, ()), "grouping": ("grouping", ()),
 }  # fmt: skip
-# By name: scenes, and seeds of each scene in training and test.
-SUITES: dict[str, tuple[tuple[str, ...], int, int]] = {
-    "crossing": (("crossing",), 2, 2), "events": (("merge", "split", "queue"), 2, 3),
-    "friends": (tuple(str(FRIENDS / f"{name}.toml") for name in ("merge", "split", "transfer")), 2, 3),
+# By name: scenes, and test seeds of each scene.
+SUITES: dict[str, tuple[tuple[str, ...], int]] = {
+    "crossing": (("crossing",), 2), "events": (("merge", "split", "queue"), 3),
+    "friends": (tuple(str(FRIENDS / f"{name}.toml") for name in ("merge", "split", "transfer")), 3),
 }  # fmt: skip
 PARTS = (0.25, 0.5, 1.0)  # of the budget
 REFERENCE, WHOLE = "ours", "ours whole"
@@ -74,12 +74,11 @@ class SpentError(Exception):
     """The budget of a search is spent."""
 
 
-@dataclass
 class Clock:
-    """CPU seconds of a search. State: what is added for episodes that need not be played again."""
+    """CPU seconds of a search. State: when it began; added: seconds of episodes that need not be played again."""
 
-    begun: float = field(default_factory=time.process_time)
-    added: float = 0.0
+    def __init__(self) -> None:
+        self.begun, self.added = time.process_time(), 0.0
 
     def now(self) -> float:
         """Returns the CPU seconds since the search began."""
@@ -225,9 +224,9 @@ class Cell:
         return mean_of_known(0.0 if isinstance(e, FlockscopeError) else goal.of(e) for e in found)
 
 
-def cell_plan(tracker: str, suite: str, search: int) -> SearchPlan:
-    """Returns the plan of a search: seeds of the scenes follow from its number."""
-    (made, fixed), (scenes, train, test) = TRACKERS[tracker], SUITES[suite]
+def cell_plan(tracker: str, suite: str, search: int, train: int) -> SearchPlan:
+    """Returns the plan of a search: seeds of the scenes follow from its number. train: training seeds of each scene."""
+    (made, fixed), (scenes, test) = TRACKERS[tracker], SUITES[suite]
     first = 20_000 + test * search
     return search_plan(
         TuneOptions(
@@ -243,6 +242,7 @@ def main() -> None:
     parser.add_argument("--trackers", nargs="+", default=list(TRACKERS), choices=TRACKERS)
     parser.add_argument("--suites", nargs="+", default=list(SUITES), choices=SUITES)
     add_seeds(parser, "0:2", "--searches", "numbers of the searches of each tracker and suite: ")
+    parser.add_argument("--training", type=int, default=2, help="training seeds of each scene")
     parser.add_argument("--trials", type=int, default=30, help="trials of `ours whole`, whose CPU time is the budget")
     parser.add_argument("--state", type=Path, help="file that keeps finished searches")
     parser.add_argument("--libraries", type=Path, default=DEFAULT, help="where the library of CMA-ES is installed")
@@ -259,7 +259,7 @@ def main() -> None:
             for suite in args.suites:
                 if all((tracker, suite, search, method) in found for method in methods):
                     continue
-                plan = cell_plan(tracker, suite, search)
+                plan = cell_plan(tracker, suite, search, args.training)
                 with episode_player(plan.tracker, plan.detections) as play:
                     cell, budget = Cell(plan, play), float("inf")
                     for method in methods:
