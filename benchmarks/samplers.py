@@ -8,12 +8,11 @@ scenes of its own. All methods begin with the defaults and get the same budget: 
 own sampler plays 30 trials without stopping any. Seconds are of the whole loop: sampler, storage, tracker and scores.
 An episode that another method has played already is not played again, but its seconds count.
 
-ours               moved parents and every fourth trial by TPE; trials that surely lose are stopped (the default)
+ours               moved parents; trials that surely lose are stopped (the default of `tune`)
 ours whole         the same, no trial is stopped
 ours by Optuna     the same, stopped by Optuna's WilcoxonPruner
-moved              moved parents only, no trial is stopped
+ours and TPE       every fourth trial is drawn by TPE, no trial is stopped
 TPE, TPE single    Optuna's TPESampler, as it is (multivariate) and univariate; no trial is stopped
-TPE stopped        TPE, stopped by the search's own rule
 TPE by Optuna      TPE, stopped by Optuna's WilcoxonPruner
 CMA-ES             Optuna's CmaEsSampler from the defaults on; categorical parameters are drawn at random
 random             Optuna's RandomSampler
@@ -42,7 +41,7 @@ from optuna.trial import TrialState, create_trial
 from benchmarks.peers.environments import DEFAULT, make_environment
 from benchmarks.support.options import add_seeds, new_parser
 from benchmarks.support.replaced_code import Replacement, replaced_code
-from benchmarks.support.tables import EXACT, difference_cell, mean_cell, number, table
+from benchmarks.support.tables import difference_cell, number, table
 from benchmarks.tuning import Follower
 from scenarios.errors import FlockscopeError
 from sim.types import Tracker
@@ -67,7 +66,11 @@ SUITES: dict[str, tuple[tuple[str, ...], int]] = {
     "friends": (tuple(str(FRIENDS / f"{name}.toml") for name in ("merge", "split", "transfer")), 3),
 }  # fmt: skip
 PARTS = (0.25, 0.5, 1.0)  # of the budget
+MANY = 10**6  # trials, more than any budget buys
 REFERENCE, WHOLE = "ours", "ours whole"
+
+
+Propose = Callable[[SearchPlan, optuna.Study, int], None]
 
 
 class SpentError(Exception):
@@ -117,7 +120,7 @@ class Episodes:
         return play
 
 
-def by(make: Callable[[SearchPlan, int], BaseSampler]) -> Replacement:
+def by(make: Callable[[SearchPlan, int], BaseSampler]) -> tuple[object, str, Propose]:
     """Returns the change of the search by which one of Optuna's samplers draws all trials but the first. make: returns
     the sampler for a plan and a seed."""
 
@@ -126,6 +129,15 @@ def by(make: Callable[[SearchPlan, int], BaseSampler]) -> Replacement:
         record.sampler = make(plan, int(seed))
 
     return study, "propose", propose
+
+
+def fourth_by_tpe(plan: SearchPlan, record: optuna.Study, number: int) -> None:
+    """Lets TPE draw every fourth trial once ten are complete; the others are moved parents."""
+    complete = record.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
+    if number % 4 == 3 and len(complete) >= 10:
+        TPE[2](plan, record, number)
+    else:
+        sampler.propose(plan, record, number)
 
 
 def cma_es(plan: SearchPlan, seed: int) -> BaseSampler:
@@ -157,16 +169,16 @@ def whole(values: Mapping[int, float]) -> optuna.trial.FrozenTrial:
 
 
 BY_OPTUNA = (study, "_estimate_if_losing", estimate_by_optuna)
+TPE = by(lambda plan, seed: TPESampler(seed=seed))
 # By method: what is replaced in the search, and the p-value that stops a trial.
 METHODS: dict[str, tuple[tuple[Replacement, ...], float]] = {
     WHOLE: ((), 0.0),  # first: its seconds are the budget
     REFERENCE: ((), TuneOptions.prune),
     "ours by Optuna": ((BY_OPTUNA,), TuneOptions.prune),
-    "moved": (((sampler, "TPE_FROM", float("inf")),), 0.0),
-    "TPE": ((by(lambda plan, seed: TPESampler(seed=seed)),), 0.0),
+    "ours and TPE": (((study, "propose", fourth_by_tpe),), 0.0),
+    "TPE": ((TPE,), 0.0),
     "TPE single": ((by(lambda plan, seed: TPESampler(seed=seed, multivariate=False)),), 0.0),
-    "TPE stopped": ((by(lambda plan, seed: TPESampler(seed=seed)),), TuneOptions.prune),
-    "TPE by Optuna": ((by(lambda plan, seed: TPESampler(seed=seed)), BY_OPTUNA), TuneOptions.prune),
+    "TPE by Optuna": ((TPE, BY_OPTUNA), TuneOptions.prune),
     "CMA-ES": ((by(cma_es),), 0.0),
     "random": ((by(lambda plan, seed: RandomSampler(seed=seed)),), 0.0),
 }
@@ -224,16 +236,93 @@ class Cell:
         return mean_of_known(0.0 if isinstance(e, FlockscopeError) else goal.of(e) for e in found)
 
 
-def cell_plan(tracker: str, suite: str, search: int, train: int) -> SearchPlan:
-    """Returns the plan of a search: seeds of the scenes follow from its number. train: training seeds of each scene."""
+# Tracker, suite, number of the search, training seeds of each scene, trials that the budget is for.
+Key = tuple[str, str, int, int, int]
+Found = dict[Key, dict[str, Searched]]  # by method
+
+
+def cell_plan(key: Key) -> SearchPlan:
+    """Returns the plan of a search: seeds of the scenes follow from its number."""
+    tracker, suite, search, train, _ = key
     (made, fixed), (scenes, test) = TRACKERS[tracker], SUITES[suite]
     first = 20_000 + test * search
     return search_plan(
         TuneOptions(
-            tracker=made, suite=scenes, seeds=range(train * search, train * (search + 1)), test=range(first, first + test),
-            check=None, set=(FPS, *fixed), seed=search,
+            tracker=made, suite=scenes, seeds=range(train * search, train * (search + 1)), check=None,
+            test=range(first, first + test), set=(FPS, *fixed), seed=search,
         )
     )  # fmt: skip
+
+
+def play_methods(key: Key, methods: Sequence[str], found: Found, state: Path | None) -> None:
+    """Plays the searches by all methods that are not found yet; prints each and stores it."""
+    mine = found.setdefault(key, {})
+    if all(method in mine for method in methods):
+        return
+    plan = cell_plan(key)
+    with episode_player(plan.tracker, plan.detections) as play:
+        cell = Cell(plan, play)
+        for method in (method for method in methods if method not in mine):
+            first = method == WHOLE
+            one = (
+                cell.searched(method, key[-1], float("inf"))
+                if first
+                else cell.searched(method, MANY, mine[WHOLE].seconds)
+            )
+            mine[method] = one
+            values = " ".join(f"{v:.4f}" for v in (*one.training, *one.test, one.defaults))
+            print(*key, method, f"{one.trials} trials, {one.seconds:.1f} s, {values}", flush=True)
+            write(state, found)
+
+
+def read(state: Path | None) -> Found:
+    """Returns the finished searches that a file keeps, {} without one."""
+    if state is None or not state.exists():
+        return {}
+    stored = json.loads(state.read_text(encoding="utf-8"))
+    return {tuple(key): {method: Searched(**one) for method, one in by_method.items()} for key, by_method in stored}
+
+
+def write(state: Path | None, found: Found) -> None:
+    """Writes the finished searches to a file."""
+    if state is not None:
+        stored = [(key, {method: vars(one) for method, one in by_method.items()}) for key, by_method in found.items()]
+        state.write_text(json.dumps(stored), encoding="utf-8")
+
+
+def report(found: Found) -> None:
+    """Prints the tables of searches; each key has the same methods."""
+    methods, trackers = next(iter(found.values())), dict.fromkeys(key[0] for key in found)
+    rows = {}
+    for method in methods:
+        pairs = [(by_method[method], by_method[REFERENCE]) for by_method in found.values()]
+        others = [
+            *([a.test[k] - b.test[k] for a, b in pairs] for k in range(len(PARTS))),
+            [a.training[-1] - b.training[-1] for a, b in pairs],
+        ]
+        rows[method] = [
+            difference_cell([a.test[-1] - a.defaults for a, _ in pairs]),
+            *("–" if method == REFERENCE else difference_cell(values) for values in others),
+            number(60 * sum(a.trials for a, _ in pairs) / sum(a.seconds for a, _ in pairs), 0),
+            "–" if method == REFERENCE else difference_cell([a.trials - b.trials for a, b in pairs], "trials"),
+        ]
+    columns = [
+        "gain over the defaults, test", *(f"less ours, test, {part:.0%} of the budget" for part in PARTS),
+        "less ours, training", "trials per CPU minute", "trials less ours",
+    ]  # fmt: skip
+    table(f"{len(found)} searches by each method", "method", columns, rows)
+    cells = {
+        tracker: [
+            number(
+                mean_of_known(
+                    by[method].test[-1] - by[method].defaults for key, by in found.items() if key[0] == tracker
+                )
+            )
+            for method in methods
+        ]
+        for tracker in trackers
+    }
+    table("Gain over the defaults on the test scenes", "tracker", list(methods), cells)
 
 
 def main() -> None:
@@ -250,76 +339,18 @@ def main() -> None:
     unknown = [name for name in args.methods if name not in METHODS]
     if unknown:
         parser.error(f"{unknown[0]}: choose from {', '.join(METHODS)}")
-    make_environment(args.libraries, "cmaes", ("cmaes",))
+    if "CMA-ES" in args.methods:
+        make_environment(args.libraries, "cmaes", ("cmaes",))
     warnings.simplefilter("ignore")
     methods = [name for name in METHODS if name in (WHOLE, REFERENCE, *args.methods)]
     found = read(args.state)
-    for search in args.searches:
-        for tracker in args.trackers:
-            for suite in args.suites:
-                if all((tracker, suite, search, method) in found for method in methods):
-                    continue
-                plan = cell_plan(tracker, suite, search, args.training)
-                with episode_player(plan.tracker, plan.detections) as play:
-                    cell, budget = Cell(plan, play), float("inf")
-                    for method in methods:
-                        key = (tracker, suite, search, method)
-                        if key not in found:
-                            trials = args.trials if method == WHOLE else 10**6
-                            found[key] = cell.searched(method, trials, budget)
-                            print(*key, one_line(found[key]), flush=True)
-                            write(args.state, found)
-                        budget = found[tracker, suite, search, WHOLE].seconds
-    keys = [(t, s, k) for k in args.searches for t in args.trackers for s in args.suites]
-    report({m: [found[t, s, k, m] for t, s, k in keys] for m in methods}, keys)
-
-
-Found = dict[tuple[str, str, int, str], Searched]
-
-
-def one_line(one: Searched) -> str:
-    """Returns what a search has reached, as text."""
-    values = " ".join(f"{v:.4f}" for v in (*one.training, *one.test, one.defaults))
-    return f"{one.trials} trials, {one.seconds:.1f} s, {values}"
-
-
-def read(state: Path | None) -> Found:
-    """Returns the finished searches that a file keeps."""
-    if state is None or not state.exists():
-        return {}
-    return {(t, s, k, m): Searched(**one) for t, s, k, m, one in json.loads(state.read_text())}
-
-
-def write(state: Path | None, found: Found) -> None:
-    """Writes the finished searches to a file."""
-    if state is not None:
-        state.write_text(json.dumps([[*key, vars(one)] for key, one in found.items()]))
-
-
-def report(found: Mapping[str, Sequence[Searched]], keys: Sequence[tuple[str, str, int]]) -> None:
-    """Prints the tables. found: by method its searches, in the order of `keys`: tracker, suite, number."""
-    rows, ours = {}, found[REFERENCE]
-    for method, searches in found.items():
-        gain = [one.test[-1] - one.defaults for one in searches]
-        rows[method] = [mean_cell(gain)]
-        if method == REFERENCE:
-            rows[method] += ["–"] * (len(PARTS) + 1)
-        else:
-            for k in range(len(PARTS)):
-                rows[method].append(difference_cell([a.test[k] - b.test[k] for a, b in zip(searches, ours, strict=True)]))
-            apart = [a.training[-1] - b.training[-1] for a, b in zip(searches, ours, strict=True)]
-            rows[method].append(difference_cell(apart))
-        rows[method].append(number(60 * sum(o.trials for o in searches) / sum(o.seconds for o in searches), 0))
-    parts = [f"{part:.0%} of the budget" for part in PARTS]
-    columns = ["gain over the defaults, test", *(f"less ours, test, {part}" for part in parts), "less ours, training"]
-    table(f"{len(keys)} searches each, goal", "method", [*columns, "trials per CPU minute"], rows)
-    names = list(dict.fromkeys(tracker for tracker, _, _ in keys))
-    cells = {}
-    for method, searches in found.items():
-        mine = {name: [o for o, key in zip(searches, keys, strict=True) if key[0] == name] for name in names}
-        cells[method] = [number(np.mean([o.test[-1] - o.defaults for o in mine[name]]).item()) for name in names]
-    cells["defaults"] = [number(np.mean([o.defaults for o, k in zip(ours, keys, strict=True) if k[0] == n]).item()) for n in names]
-    table("Gain over the defaults on the test scenes", "method", names, cells)
+    keys = [
+        (tracker, suite, search, args.training, args.trials)
+        for search in args.searches for tracker in args.trackers for suite in args.suites
+    ]  # fmt: skip
+    for key in keys:
+        play_methods(key, methods, found, args.state)
+    report({key: {method: found[key][method] for method in methods} for key in keys})
 
 
 if __name__ == "__main__":
