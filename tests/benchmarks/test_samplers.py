@@ -59,6 +59,21 @@ def test_a_budget_buys_as_many_trials_with_every_method(tmp_path, monkeypatch, m
     assert found.test == (found.defaults,) * 3
 
 
+def test_a_part_of_the_budget_counts_the_trials_that_ended_in_it(tmp_path, monkeypatch):
+    """Each trial is better than those before; of ten trials two end in a quarter of their time, five in half of it."""
+    play = Counted(monkeypatch)
+
+    def better(sources, values, every):
+        for episode in play(sources, values, every):
+            yield replace(episode, scores={"HOTA": play.seconds / 1000})
+
+    cell = Cell(toy_plan(tmp_path, seeds=range(2), only=["reach"]), better)
+    begun = play.seconds
+    found = cell.searched(WHOLE, 10, float("inf"))
+    assert [1000 * value - begun for value in found.training] == pytest.approx([3.5, 9.5, 19.5])
+    assert found.test == tuple(sorted(found.test))
+
+
 LOST = [([-0.1] * 3, False), ([-0.1] * 4, True), ([0.1] * 4, False), ([0.0] * 5, False), ([-0.1] * 5 + [0.0], True)]
 
 
@@ -105,5 +120,7 @@ def test_a_run_goes_on_where_it_ended(tmp_path, monkeypatch):
     assert again == {key: {m: replace(o, test=list(o.test), training=list(o.training)) for m, o in found[key].items()}}
     samplers.play_methods(key, [WHOLE, "ours"], again, state)
     assert play.episodes == played
+    ours = again[key]["ours"]
     samplers.play_methods(key, [WHOLE, "ours", "random"], again, state)
+    assert again[key]["ours"] is ours
     assert samplers.read(state)[key]["random"].seconds == found[key][WHOLE].seconds
