@@ -8,14 +8,14 @@ scenes of its own. All methods begin with the defaults and get the same budget: 
 own sampler plays 30 trials without stopping any. Seconds are of the whole loop: sampler, storage, tracker and scores.
 An episode that another method has played already is not played again, but its seconds count.
 
-ours               moved parents; trials that surely lose are stopped (the default of `tune`)
-ours whole         the same, no trial is stopped
-ours by Optuna     the same, stopped by Optuna's WilcoxonPruner
-ours and TPE       every fourth trial is drawn by TPE, no trial is stopped
-TPE, TPE single    Optuna's TPESampler, as it is (multivariate) and univariate; no trial is stopped
-TPE by Optuna      TPE, stopped by Optuna's WilcoxonPruner
-CMA-ES             Optuna's CmaEsSampler from the defaults on; categorical parameters are drawn at random
-random             Optuna's RandomSampler
+ours             moved parents; trials that surely lose are stopped (the default of `tune`)
+ours-whole       the same, no trial is stopped
+ours-wilcoxon    the same, stopped by Optuna's WilcoxonPruner
+ours-tpe         every fourth trial is drawn by TPE, no trial is stopped
+tpe, tpe-single  Optuna's TPESampler, as it is (multivariate) and univariate; no trial is stopped
+tpe-wilcoxon     TPE, stopped by Optuna's WilcoxonPruner
+cma-es           Optuna's CmaEsSampler from the defaults on; categorical parameters are drawn at random
+random           Optuna's RandomSampler
 
 The judged figure is the goal (objective; pairwise_F1 for `grouping`) on the test scenes, of the config with the best
 mean on the training scenes so far, after a quarter, half and all of the budget. Differences from `ours` are paired over
@@ -67,7 +67,7 @@ SUITES: dict[str, tuple[tuple[str, ...], int]] = {
 }  # fmt: skip
 PARTS = (0.25, 0.5, 1.0)  # of the budget
 MANY = 10**6  # trials, more than any budget buys
-REFERENCE, WHOLE = "ours", "ours whole"
+REFERENCE, WHOLE = "ours", "ours-whole"
 
 
 Propose = Callable[[SearchPlan, optuna.Study, int], None]
@@ -174,12 +174,12 @@ TPE = by(lambda plan, seed: TPESampler(seed=seed))
 METHODS: dict[str, tuple[tuple[Replacement, ...], float]] = {
     WHOLE: ((), 0.0),  # first: its seconds are the budget
     REFERENCE: ((), TuneOptions.prune),
-    "ours by Optuna": ((BY_OPTUNA,), TuneOptions.prune),
-    "ours and TPE": (((study, "propose", fourth_by_tpe),), 0.0),
-    "TPE": ((TPE,), 0.0),
-    "TPE single": ((by(lambda plan, seed: TPESampler(seed=seed, multivariate=False)),), 0.0),
-    "TPE by Optuna": ((TPE, BY_OPTUNA), TuneOptions.prune),
-    "CMA-ES": ((by(cma_es),), 0.0),
+    "ours-wilcoxon": ((BY_OPTUNA,), TuneOptions.prune),
+    "ours-tpe": (((study, "propose", fourth_by_tpe),), 0.0),
+    "tpe": ((TPE,), 0.0),
+    "tpe-single": ((by(lambda plan, seed: TPESampler(seed=seed, multivariate=False)),), 0.0),
+    "tpe-wilcoxon": ((TPE, BY_OPTUNA), TuneOptions.prune),
+    "cma-es": ((by(cma_es),), 0.0),
     "random": ((by(lambda plan, seed: RandomSampler(seed=seed)),), 0.0),
 }
 
@@ -332,14 +332,14 @@ def main() -> None:
     parser.add_argument("--suites", nargs="+", default=list(SUITES), choices=SUITES)
     add_seeds(parser, "0:2", "--searches", "numbers of the searches of each tracker and suite: ")
     parser.add_argument("--training", type=int, default=2, help="training seeds of each scene")
-    parser.add_argument("--trials", type=int, default=30, help="trials of `ours whole`, whose CPU time is the budget")
+    parser.add_argument("--trials", type=int, default=30, help="trials of `ours-whole`, whose CPU time is the budget")
     parser.add_argument("--state", type=Path, help="file that keeps finished searches")
     parser.add_argument("--libraries", type=Path, default=DEFAULT, help="where the library of CMA-ES is installed")
     args = parser.parse_args()
     unknown = [name for name in args.methods if name not in METHODS]
     if unknown:
         parser.error(f"{unknown[0]}: choose from {', '.join(METHODS)}")
-    if "CMA-ES" in args.methods:
+    if "cma-es" in args.methods:
         make_environment(args.libraries, "cmaes", ("cmaes",))
     warnings.simplefilter("ignore")
     methods = [name for name in METHODS if name in (WHOLE, REFERENCE, *args.methods)]

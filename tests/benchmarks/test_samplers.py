@@ -48,7 +48,7 @@ def test_an_episode_is_played_once_and_counted_for_each_search(tmp_path, monkeyp
 @pytest.mark.parametrize("method", METHODS)
 def test_a_budget_buys_as_many_trials_with_every_method(tmp_path, monkeypatch, method):
     """Two training scenes and no stopping: 20 s are 10 trials, of which each better one is what a part has reached."""
-    pytest.importorskip("cmaes") if method == "CMA-ES" else None
+    pytest.importorskip("cmaes") if method == "cma-es" else None
     plan, play = toy_plan(tmp_path, seeds=range(2), only=["skip", "reach"], set=["colour=red"]), Counted(monkeypatch)
     cell = Cell(plan, play)
     assert cell.searched(WHOLE, 10, float("inf")).seconds == 20
@@ -99,13 +99,13 @@ def test_optunas_pruner_stops_a_sure_loss(tmp_path, gains, stopped, objective):
 def test_the_tables_pair_searches(capsys):
     ours = [samplers.Searched(30, 60.0, (0.5, 0.5, 0.5), (0.5, 0.5, 0.5 + 0.01 * k), 0.4) for k in range(6)]
     other = [samplers.Searched(60, 60.0, (0.5, 0.5, 0.6), (0.5, 0.5, 0.6 + 0.01 * k), 0.4) for k in range(6)]
-    report({("blob", "quick", k, 2, 30): {"ours": ours[k], "TPE": other[k]} for k in range(6)})
+    report({("blob", "quick", k, 2, 30): {"ours": ours[k], "tpe": other[k]} for k in range(6)})
     lines = capsys.readouterr().out.splitlines()
     assert "| ours | +0.125 [+0.105, +0.145] * | – | – | – | – | 30 | – |" in lines
     assert lines[-1] == "| blob | 0.125 | 0.225 |"
     even, ahead = "+0.000 [+0.000, +0.000]", "+0.100 [+0.100, +0.100] *"
     more = "+30.000 [+30.000, +30.000] *"
-    assert f"| TPE | +0.225 [+0.205, +0.245] * | {even} | {even} | {ahead} | {ahead} | 60 | {more} |" in lines
+    assert f"| tpe | +0.225 [+0.205, +0.245] * | {even} | {even} | {ahead} | {ahead} | 60 | {more} |" in lines
 
 
 def test_a_run_goes_on_where_it_ended(tmp_path, monkeypatch):
