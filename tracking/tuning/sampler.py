@@ -4,7 +4,7 @@ Declared ranges are wide and defaults are good, so a point drawn anywhere in the
 parameters, is nearly always worse. A trial therefore starts from one of the best finished trials, at first from the
 defaults. Some of its parameters, three on average, are moved by a step whose standard deviation lies between a fortieth
 and a half of the range, on the log scale where the parameter is declared so. In equal CPU time Optuna's TPE finds less
-in the first half of a search, and neither TPE nor CMA-ES finds more in all of it (`python -m benchmarks samplers`).
+early in a search, and neither TPE nor CMA-ES surely more in all of it (`python -m benchmarks samplers`).
 
 The parameters of trial n depend only on the seed, on n and on the trials finished before. A search that was killed and
 is resumed therefore finds what it would have found.
