@@ -1,10 +1,10 @@
-"""Chooses the parameters of the next trial: mostly a good trial with a few parameters moved, every fourth time by TPE.
+"""Chooses the parameters of the next trial: those of a good trial, with a few of them moved.
 
 Declared ranges are wide and defaults are good, so a point drawn anywhere in them, or from a density over many
 parameters, is nearly always worse. A trial therefore starts from one of the best finished trials, at first from the
 defaults. Some of its parameters, three on average, are moved by a step whose standard deviation lies between a fortieth
-and a half of the range, on the log scale where the parameter is declared so. Every fourth trial is drawn by Optuna's
-TPE sampler, which looks at all trials.
+and a half of the range, on the log scale where the parameter is declared so. In equal CPU time Optuna's TPE finds less
+early in a search, and neither TPE nor CMA-ES surely more in all of it (`python -m benchmarks samplers`).
 
 The parameters of trial n depend only on the seed, on n and on the trials finished before. A search that was killed and
 is resumed therefore finds what it would have found.
@@ -12,8 +12,9 @@ is resumed therefore finds what it would have found.
 A trial is stopped early when it surely loses to the best trial on the scenes that both were played on: the
 p-value of a paired test lies below a limit. The test is Wilcoxon's signed-rank test (1945), one-sided, as in Optuna's
 WilcoxonPruner. *Ours*: p-values are exact with ties and zeros, too. Parameters that change nothing in most scenes give
-zeros and ties; scipy then draws permutations, which takes longer than an episode (figures: CONTRIBUTING.md). The test
-is repeated after each scene, so p is not the error rate of a whole trial.
+zeros and ties; scipy then counts permutations, which takes longer than the episodes that are saved (`python -m
+benchmarks samplers ours-wilcoxon --training 4`). The test is repeated after each scene, so p is not the error rate of a
+whole trial.
 """
 
 from __future__ import annotations
@@ -24,7 +25,6 @@ from typing import Any, cast
 import numpy as np
 import optuna
 from optuna.distributions import BaseDistribution, CategoricalDistribution, FloatDistribution, IntDistribution
-from optuna.samplers import TPESampler
 from optuna.trial import FrozenTrial, TrialState
 
 from sim.types import Array
@@ -37,8 +37,6 @@ PRUNED = "pruned after"  # Attribute of a trial: episodes played before it was s
 MOVED = 3  # Number of parameters that are moved, on average.
 STEPS = (0.05, 1.0)  # Least and greatest standard deviation of a step; the range of a parameter is [-1, 1].
 PARENTS = 3  # Number of best trials that a trial may start from.
-TPE_EVERY = 4  # Every so many trials one is drawn by TPE.
-TPE_FROM = 10  # Number of complete trials before TPE is used.
 
 
 def distribution(p: Param) -> BaseDistribution:
@@ -50,20 +48,11 @@ def distribution(p: Param) -> BaseDistribution:
     return FloatDistribution(p.low, p.high, log=p.scale == "log")
 
 
-def tpe_sampler(plan: SearchPlan, number: int) -> TPESampler:
-    """Returns Optuna's TPE sampler for trial `number`, with a seed that follows from the search's seed and number."""
-    seed = np.random.SeedSequence([plan.options.seed, number]).generate_state(1)[0]
-    return TPESampler(seed=int(seed), n_startup_trials=TPE_FROM)
-
-
 def propose(plan: SearchPlan, study: optuna.Study, number: int) -> None:
-    """Makes TPE the study's sampler, and enqueues the parameters of trial `number` unless TPE is to draw them. TPE
-    draws every fourth trial, once 10 trials are complete."""
-    study.sampler = tpe_sampler(plan, number)
+    """Enqueues the parameters of trial `number`."""
     complete = study.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
-    if number % TPE_EVERY != TPE_EVERY - 1 or len(complete) < TPE_FROM:
-        rng = np.random.default_rng(np.random.SeedSequence([plan.options.seed, number]))
-        study.enqueue_trial(_moved(plan, study, complete, rng))
+    rng = np.random.default_rng(np.random.SeedSequence([plan.options.seed, number]))
+    study.enqueue_trial(_moved(plan, study, complete, rng))
 
 
 def _moved(

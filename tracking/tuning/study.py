@@ -27,6 +27,7 @@ import numpy as np
 import optuna
 from filelock import FileLock, Timeout
 from optuna.exceptions import UpdateFinishedTrialError
+from optuna.samplers import RandomSampler
 from optuna.storages import JournalStorage, get_storage
 from optuna.storages.journal import JournalFileBackend
 from optuna.trial import FrozenTrial, TrialState
@@ -38,7 +39,7 @@ from tracking.stats import mean_of_known
 from tracking.tuning.candidates import STORED, TrialRecord
 from tracking.tuning.episode_player import PlayEpisodes
 from tracking.tuning.options import Progress
-from tracking.tuning.sampler import PRUNED, distribution, propose, should_prune, tpe_sampler
+from tracking.tuning.sampler import PRUNED, distribution, propose, should_prune
 from tracking.tuning.search_plan import SearchPlan
 
 SQLITE = re.compile(r"sqlite(?:\+\w+)?:///(?!:memory:)([^?]+)(?:\?.*)?")  # URL of a file, which gets locks, too
@@ -158,12 +159,8 @@ class SearchStudy:
             begun = [t for t in trials if t.state in (*FINISHED, TrialState.RUNNING)]
             for t in begun:
                 if t.state == TrialState.RUNNING and (take_running or self.locks.take_trial(t.number)):
-                    self.optuna.sampler = tpe_sampler(self.plan, t.number)
                     trial = optuna.Trial(self.optuna, t._trial_id)
-                    for name, choices in self._space.items():  # the process may have ended before it had chosen all
-                        # What was drawn alone is drawn again, so that the generator continues from there.
-                        if name in t.params and name not in trial.relative_params:
-                            self.optuna.sampler.sample_independent(self.optuna, t, name, choices)
+                    for name, choices in self._space.items():  # the process may have ended before it had stored all
                         trial._suggest(name, choices)
                     return trial
             if len(begun) >= self.plan.options.trials:
@@ -226,6 +223,7 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
                 study = optuna.create_study(
                     storage=place, study_name=name, load_if_exists=True,
                     directions=["maximize" if goal.higher else "minimize" for goal in plan.goals],
+                    sampler=RandomSampler(0),  # draws nothing: all trials are enqueued
                 )  # fmt: skip
         except OSError:
             raise

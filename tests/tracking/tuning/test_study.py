@@ -59,16 +59,14 @@ def test_what_is_tried_follows_from_the_seed(tmp_path):
 
 
 def test_a_trial_moves_few_parameters_of_the_best(tmp_path):
-    """The defaults, then three changes on the mean; every fourth trial later is TPE's and changes them all."""
+    """The defaults, then three changes on the mean."""
     with open_study(toy_plan(tmp_path, tracker="blob", trials=24), None, "x") as study:
         while (asked := study.ask()) is not None:
             study.tell(asked, [0.5 if asked.number == 0 else 0.4])
         first, *others = (t.params for t in study.finished())
     moved = [sum(params[name] != first[name] for name in params) for params in others]
-    near, far = [n for k, n in enumerate(moved, 1) if k < 11 or k % 4 != 3], moved[10::4]
-    assert min(near) >= 1
-    assert 2 <= sum(near) / len(near) <= 7
-    assert min(far) > len(first) / 2
+    assert min(moved) >= 1
+    assert 2 <= sum(moved) / len(moved) <= 7
 
 
 def test_a_trial_that_failed_does_not_end_the_climb(tmp_path):
