@@ -53,7 +53,7 @@ RECORDINGS = {"PETS09": PETS, "TownCentre": TOWN_CENTRE, "TUD-Campus": CAMPUS}
 NAMES = ("SORT", "ByteTrack", "OC-SORT", "norfair")
 KINDS = {name: PEERS[name][1] for name in NAMES} | {"blob": Blob}
 SCORE = "HOTA"
-LABELS = "labels of the first third"
+LABELS, OTHERS = "labels of the first third", "labels of another"
 SEED, HALF = 0, 0.5  # of draws; share of the parameters that a draw anywhere changes
 Found = dict[str, dict[str, list[float]]]  # by recording and way: the difference and its ends
 
@@ -134,27 +134,30 @@ def third(recording: Sequence) -> int:
 
 
 def show(every: Mapping[str, Found]) -> None:
-    """Prints the tables."""
-    ways = ["standard", "--like", LABELS, "labels of another", "itself"]
-
-    def mean(row: Mapping[str, list[float]], way: str) -> float:
-        labelled = [values[0] for key, values in row.items() if key.startswith("labels of")]
-        return float(np.mean(labelled)) if way == "labels of another" else row[way][0]
-
-    gains = {name: {way: [mean(row, way) for row in found.values()] for way in ways} for name, found in every.items()}
+    """Prints the tables, of the ways that all trackers and recordings have."""
+    found = [row for each in every.values() for row in each.values()]
+    ways = [way for way in ("standard", "--like", LABELS, OTHERS, "itself") if all(way in known(row) for row in found)]
+    gains = {name: {way: [known(row)[way][0] for row in each.values()] for way in ways} for name, each in every.items()}
     rows = {name: [f"{np.mean(each[way]):+.3f}" for way in ways] for name, each in gains.items()}
     others = [name for name in NAMES if name in gains]
     if others:
         rows["mean of the libraries"] = [f"{np.mean([gains[n][way] for n in others]):+.3f}" for way in ways]
         rows["their worst"] = [f"{np.min([gains[n][way] for n in others]):+.3f}" for way in ways]
     table(f"{SCORE} minus that of the defaults, mean of the recordings", "tracker", ways, rows)
-    for name, found in every.items():
-        columns = ["default", *ways[:3], *(f"labels of {place}" for place in RECORDINGS), "itself"]
+    places = [f"labels of {place}" for place in RECORDINGS] if OTHERS in ways else []
+    columns = [*(way for way in ways if way not in (OTHERS, "itself")), *places, "itself"]
+    for name, each in every.items():
         cells = {
-            place: [interval(*row["default"]), *(signed(*row[way]) if way in row else "–" for way in columns[1:])]
-            for place, row in found.items()
+            place: [interval(*row["default"]), *(signed(*row[way]) if way in row else "–" for way in columns)]
+            for place, row in each.items()
         }
-        table(f"{name}, {SCORE}", "recording", columns, cells)
+        table(f"{name}, {SCORE}", "recording", ["default", *columns], cells)
+
+
+def known(row: Mapping[str, list[float]]) -> dict[str, list[float]]:
+    """Returns the gains of a recording by way, with the mean of those with the labels of other recordings."""
+    others = [values[0] for key, values in row.items() if key.startswith("labels of ") and key != LABELS]
+    return {**row, **({OTHERS: [float(np.mean(others))]} if len(others) == len(RECORDINGS) - 1 else {})}
 
 
 def main() -> None:
