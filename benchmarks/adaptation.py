@@ -178,16 +178,21 @@ def playable(bench: Bench, found: Sequence[Scene]) -> list[Scene]:
 
 
 class Search:
-    """Plays sets of parameters on all training scenes. State: `best`, the best mean objective after each round."""
+    """Plays sets of parameters on all training scenes. State: `means`, the mean objective of each round."""
 
     def __init__(self, bench: Bench, training: Sequence[Scene]) -> None:
-        self.bench, self.training, self.best = bench, training, list[float]()
+        self.bench, self.training, self.means = bench, training, list[float]()
 
     def play(self, policy: Policy, offset: Array) -> list[Played]:
         """Returns what a policy plays; offset (P,): is added to its residuals."""
         found = [self.bench.play(scene, policy, offset) for scene in self.training]
-        self.best.append(max([mean_objective(found), *self.best[-1:]]))
+        self.means.append(mean_objective(found))
         return found
+
+    @property
+    def best(self) -> list[float]:
+        """The best mean objective after each round."""
+        return np.maximum.accumulate(self.means).tolist()  # type: ignore[no-any-return]
 
 
 def by_optuna(search: Search, sampler: Any, rounds: int, size: int, made: Callable[[Array], Any]) -> list[Any]:
@@ -243,7 +248,7 @@ def adaptation(name: str, configs: int, train: range, seeds: range, picture: Pat
     size, still = len(bench.space), np.zeros(len(bench.space))
     searches = {key: Search(bench, training) for key in ("random", "TPE", "CMA", "linear by CMA", "policy")}
     policy, _ = searched_policy(searches["policy"].play, bench.base, bench.space, configs, SEED, lambda text: None)
-    rounds = len(searches["policy"].best)
+    rounds = len(searches["policy"].means)
     drawn = drawn_residuals(bench.space, rounds, np.random.default_rng(SEED))
     pools = {
         "random": [((bench.still, each), searches["random"].play(bench.still, each)) for each in drawn],

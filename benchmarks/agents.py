@@ -31,7 +31,7 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from benchmarks.adaptation import LIMIT, SEARCHED, SUITES, TRAINING, Bench, Scene, playable, scenes
+from benchmarks.adaptation import LIMIT, SEARCHED, SUITES, TRAINING, Bench, Scene, Search, playable, scenes
 from benchmarks.peers.environments import DEFAULT, make_environments
 from benchmarks.support import chart
 from benchmarks.support.options import add_seeds, add_trackers, new_parser, one_thread, seeds_text
@@ -40,7 +40,7 @@ from scenarios.errors import InputError
 from sim.types import Array
 from tracking.environment.env import Floats, Reward, TuningEnv
 from tracking.running.policy import Policy
-from tracking.tuning.adaptive import EVERY, FITS, Played, mean_objective, searched_policy
+from tracking.tuning.adaptive import EVERY, FITS, searched_policy
 
 ALGORITHMS = "PPO", "SAC", "linear"
 GAMMA: dict[Reward, float] = {"window": 0.99, "prefix": 1.0}
@@ -122,15 +122,9 @@ def learned_by_agent(
 
 def learned_linear(bench: Bench, training: Sequence[Scene], configs: int, seed: int) -> tuple[Array, Play]:
     """Returns the same of a linear policy."""
-    curve = list[float]()
-
-    def play(policy: Policy, offset: Array) -> list[Played]:
-        found = [bench.play(scene, policy, offset) for scene in training]
-        curve.append(mean_objective(found))
-        return found
-
-    policy, _ = searched_policy(play, bench.base, bench.space, configs, seed, lambda text: None)
-    return np.array(curve), partial(played_by, bench, policy)
+    search = Search(bench, training)
+    policy, _ = searched_policy(search.play, bench.base, bench.space, configs, seed, lambda text: None)
+    return np.array(search.means), partial(played_by, bench, policy)
 
 
 def played_by(bench: Bench, policy: Policy, scene: Scene) -> float:
@@ -221,7 +215,7 @@ def draw(name: str, algorithms: Sequence[str], seeds: int, results: Results, pat
 
 def main() -> None:
     parser = new_parser(__doc__)
-    add_trackers(parser, SEARCHED)
+    add_trackers(parser, SEARCHED, "group-pda and blob")
     parser.add_argument("--algorithms", nargs="+", choices=ALGORITHMS, default=ALGORITHMS, help="what learns")
     parser.add_argument("--training-seeds", type=int, default=5, help="how often each learns")
     parser.add_argument("--configs", type=int, default=24, help="budget: as of `benchmarks.adaptation`")

@@ -263,13 +263,8 @@ def play_methods(key: Key, methods: Sequence[str], found: Found, state: Path | N
     with episode_player(plan.tracker, plan.detections) as play:
         cell = Cell(plan, play)
         for method in (method for method in methods if method not in mine):
-            first = method == WHOLE
-            one = (
-                cell.searched(method, key[-1], float("inf"))
-                if first
-                else cell.searched(method, MANY, mine[WHOLE].seconds)
-            )
-            mine[method] = one
+            budget = (key[-1], float("inf")) if method == WHOLE else (MANY, mine[WHOLE].seconds)
+            mine[method] = one = cell.searched(method, *budget)
             values = " ".join(f"{v:.4f}" for v in (*one.training, *one.test, one.defaults))
             print(*key, method, f"{one.trials} trials, {one.seconds:.1f} s, {values}", flush=True)
             write(state, found)

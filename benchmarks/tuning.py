@@ -33,7 +33,7 @@ from benchmarks.peers.adapters import PEERS
 from benchmarks.peers.environments import DEFAULT, make_environments
 from benchmarks.support.options import CAMPUS, PETS, TOWN_CENTRE, add_data, add_trackers, new_parser, one_thread
 from benchmarks.support.tables import interval, signed, table
-from sim.types import Array, Sequence
+from sim.types import Array, Sequence, Tracks
 from tracking.config import Config
 from tracking.fitting.scene_like import scene_like
 from tracking.papers.blob.tracker import Blob
@@ -41,6 +41,7 @@ from tracking.parameter_space import decode, moved, space_of
 from tracking.recording_ranking import presence_in
 from tracking.recordings.source import open_source
 from tracking.running.run import track
+from tracking.scoring import evaluate
 from tracking.scoring.catalogue import CATALOGUE
 from tracking.scoring.evaluation import Scorer
 from tracking.stats import block_intervals
@@ -73,7 +74,16 @@ def tuned_on_itself(kind: Any, recording: Sequence, trials: int) -> Config:
     anywhere = random.uniform(-1, 1, (trials // 2, len(space))) * (random.random((trials // 2, len(space))) < HALF)
     drawn = np.concatenate([drawn_residuals(space, trials - trials // 2, random), anywhere])
     configs = [decode(space, moved(space, each, base), base) for each in drawn]
-    return max(configs, key=lambda config: gain(kind, recording, config)[0])
+
+    def score(config: Config) -> float:
+        return evaluate(recording.truth, run_of(kind, recording, config), similarity="boxes")[SCORE]
+
+    return max(configs, key=score)
+
+
+def run_of(kind: Any, recording: Sequence, config: Config) -> list[Tracks]:
+    """Returns what a tracker with a config makes of the detections of a recording."""
+    return list(track(kind, recording, params=config, detections="file"))
 
 
 def gain(kind: Any, recording: Sequence, config: Config, first: int = 0) -> tuple[float, float, float]:
@@ -88,8 +98,9 @@ def _scores(
     """Returns the score of the first config, and the difference of the second, each with its ends."""
     truth = recording.truth
     assert truth is not None
-    runs = [list(track(kind, recording, params=c, detections="file")) for c in configs]
-    one, two = (each.weighted_scores("hull") for each in Scorer(truth).compare(runs, "boxes"))
+    runs = {config: run_of(kind, recording, config) for config in configs}
+    compared = Scorer(truth).compare([runs[config] for config in configs], "boxes")
+    one, two = (each.weighted_scores("hull") for each in compared)
     at = list(CATALOGUE).index(SCORE)
 
     def scores(weights: Array) -> Array:

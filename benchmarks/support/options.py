@@ -48,8 +48,9 @@ def add_data(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--data", type=Path, default=default, metavar="FOLDER", help="folder of real recordings")
 
 
-def add_trackers(parser: argparse.ArgumentParser, known: Iterable[str]) -> None:
-    """Adds the names of trackers as an argument; `trackers` is [] without any. known: those that may be given."""
+def add_trackers(parser: argparse.ArgumentParser, known: Iterable[str], absent: str = "all") -> None:
+    """Adds the names of trackers as an argument; `trackers` is [] without any. known: those that may be given; absent:
+    which are meant without any."""
 
     def name(text: str) -> str:
         if text not in known:
@@ -57,7 +58,9 @@ def add_trackers(parser: argparse.ArgumentParser, known: Iterable[str]) -> None:
         return text
 
     known = tuple(known)
-    parser.add_argument("trackers", nargs="*", type=name, metavar="TRACKER", help=f"{', '.join(known)}; all if absent")
+    parser.add_argument(
+        "trackers", nargs="*", type=name, metavar="TRACKER", help=f"{', '.join(known)}; {absent} if absent"
+    )
 
 
 def one_thread() -> None:

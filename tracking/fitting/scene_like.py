@@ -63,10 +63,9 @@ class Walk:
 
 @dataclass(frozen=True)
 class Likeness:
-    """A recording as a scenario: its file's text, the detector's profile, mean number of people in view."""
+    """A recording as a scenario, with the profile of its detector; people: mean number of people in view."""
 
     scenario: Scenario
-    sensor: Sensor
     people: float
 
     def to_toml(self) -> str:
@@ -75,7 +74,7 @@ class Likeness:
 
     def as_dict(self) -> dict[str, Any]:
         """Returns what was found, by name."""
-        camera, sensor = self.scenario.camera, self.sensor
+        camera, sensor = self.scenario.camera, self.scenario.sensor
         return {
             "people": round(self.people, 1), "ways": len(self.scenario.group), "fps": camera.fps,
             "tilt_deg": camera.tilt_deg, "height": camera.height, "detect_prob": sensor.detect_prob,
@@ -123,7 +122,7 @@ def scene_like(recording: Recording, *, labels: bool = False) -> Likeness:
     for _ in range(TRIES):
         factor *= wanted / max(_in_view(scenario), 0.1)
         scenario = place.scenario(sensor, factor)
-    return Likeness(scenario, sensor, wanted)
+    return Likeness(scenario, wanted)
 
 
 def _checked(recording: Recording, labels: bool) -> Recording:

@@ -50,12 +50,7 @@ def in_one_plane(
     unless None, which chooses it by the data. Raises IncomparableError if a run on the ground must be moved to the
     image but has no boxes of people.
     """
-    ground = similarity == "ground"
-    if similarity in (None, "boxes"):
-        ground = truth.pos is not None and all(
-            plane_of(truth, run) != "image" or can_stand(run, truth.camera, own)
-            for run, own in zip(runs, sources, strict=True)
-        )
+    ground = _meet_on_ground(truth, runs, sources, similarity)
     moved = [
         _on_ground(truth, run) if ground else _in_image(truth, run, own) for run, own in zip(runs, sources, strict=True)
     ]
@@ -69,9 +64,18 @@ def in_one_plane(
 
 def stands(truth: Truth, run: Sequence[Tracks], source: str | None, similarity: Similarity | None) -> bool:
     """Returns True if `in_one_plane` returns a run, compared alone, as `standing` moves it to the ground."""
-    if similarity == "image" or truth.camera is None or (similarity != "ground" and truth.pos is None):
-        return False
-    return can_stand(run, truth.camera, None if similarity == "ground" else source)
+    return _meet_on_ground(truth, [run], [source], similarity) and can_stand(run, truth.camera)
+
+
+def _meet_on_ground(
+    truth: Truth, runs: Sequence[Sequence[Tracks]], sources: Sequence[str | None], similarity: Similarity | None
+) -> bool:
+    if similarity in (None, "boxes"):
+        return truth.pos is not None and all(
+            plane_of(truth, run) != "image" or can_stand(run, truth.camera, own)
+            for run, own in zip(runs, sources, strict=True)
+        )
+    return similarity == "ground"
 
 
 def _on_ground(truth: Truth, run: Sequence[Tracks]) -> Sequence[Tracks]:

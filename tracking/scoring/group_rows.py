@@ -90,9 +90,7 @@ class TrueGroups:
         indices of those in these frames."""
         groups, here = self.groups.part(span(self.groups.rows.frame, frames)), span(people.frame, frames)
         groups = groups.keep(frames[groups.rows.frame])
-        number = np.append(
-            np.cumsum(frames[people.frame[here]]) - 1, -1
-        )  # the last element keeps -1, an unknown member
+        number = np.append(np.cumsum(frames[people.frame[here]]) - 1, -1)  # the last keeps -1, an unknown member
         member = np.where(groups.member < 0, -1, groups.member - here.start)
         return TrueGroups(replace(groups, member=number[member]), self.comparable)
 

@@ -44,7 +44,7 @@ def test_camera_people_and_detector_are_like_those_of_the_recording(street: Sequ
     seen = (made.truth.truncation < 0.5).sum() / made.truth.length
     assert seen == pytest.approx(real, rel=0.5)
     labelled = fit_matched([match_sequence(street)])
-    assert found.sensor.detect_prob == pytest.approx(labelled.detect_prob, abs=0.0 if labels else 0.15)
+    assert found.scenario.sensor.detect_prob == pytest.approx(labelled.detect_prob, abs=0.0 if labels else 0.15)
 
 
 def test_people_who_are_not_found_are_counted_by_simulated_detections(monkeypatch: pytest.MonkeyPatch) -> None:
