@@ -12,7 +12,7 @@ labels      on the scenes that `fit scene --labels` makes of the first third of 
             detector; judged on the rest
 labels of…  the same of another recording, the whole of it
 itself      on the recording itself, by four times as many draws as the search has trials, half of them round the
-            defaults, half anywhere: what there is to gain
+            defaults, half anywhere; a search may find more
 
 The first table has the mean over recordings, and over the trackers of other libraries.
 """

@@ -104,8 +104,8 @@ def tuning() -> str:
     return (
         f"What it earns on {len(RECORDINGS)} recordings, mean HOTA: {count} trackers of other libraries"
         f" {signed(others['standard'])} if tuned on standard scenes, {signed(others['--like'])} on scenes like the"
-        f" recording without its labels, {signed(others['labels of another'])} with the labels of another one, of"
-        f" {signed(others['itself'])} that there is to gain; `blob`, whose defaults are tuned already,"
-        f" {signed(ours['standard'])}, {signed(ours['--like'])}, {signed(ours['labels of another'])} of"
+        f" recording without its labels, {signed(others['labels of another'])} with the labels of another one; draws on"
+        f" the recording itself find {signed(others['itself'])}. `blob`, whose defaults are tuned already,"
+        f" {signed(ours['standard'])}, {signed(ours['--like'])}, {signed(ours['labels of another'])} and"
         f" {signed(ours['itself'])} {link('docs/results/tuning.md', 'tuning')}."
     )
