@@ -12,11 +12,15 @@ with 95 % intervals:
 defaults           the tracker's own
 random, TPE, CMA   constants drawn round the defaults, by Optuna's TPE and by its CMA-ES; the best in training of all
                    three is the best constant
+TPE, twice         by TPE with the rounds that a policy has beside those of a constant
 hindsight          for each part of each entry of `drift` the constant that was best there in training; it is told when
                    the parts begin, which no tracker knows: what could be gained
+
+and residuals round the best constant, with rounds of their own:
+
 rule               three lines: the noise of positions follows the residuals, the probability of detection the share of
                    tracks that are found, false alarms the detections that belong to no track
-linear by CMA      residuals linear in four statistics, whose weights Optuna's CMA-ES searches
+linear by CMA      linear in four statistics, whose weights Optuna's CMA-ES searches
 policy             linear, from a response surface (`tracking.tuning.adaptive`), as `tune --adaptive` finds it
 
 SORT and ByteTrack are those of roboflow `trackers` (benchmarks/peers). --chart: the best training value over the
@@ -43,15 +47,17 @@ from scenarios.schema.schedule import Schedule
 from scenarios.schema.values import Model
 from sim.draws import drawn
 from sim.types import Array
+from tracking.config import Config
 from tracking.environment.env import Reward, TuningEnv
 from tracking.episodes.episode_cache import SourceCache
 from tracking.episodes.sources import Source, sources
-from tracking.parameter_space import space_of
+from tracking.parameter_space import decode, moved, space_of
 from tracking.running.policy import BIAS, Policy
 from tracking.running.signals import NAMES
 from tracking.running.tracker_registry import config_class, find
 from tracking.tuning.adaptive import (
     EVERY,
+    FITS,
     MEMORY,
     Played,
     drawn_residuals,
@@ -66,7 +72,7 @@ LIMIT, SEED = 0.4, 0  # of the rule; of the searches
 SCENES = 2**31  # bytes of scenes that are kept
 SPREAD = 0.3  # standard deviation with which CMA-ES begins; of a linear policy, for statistics of unit variance
 TOLD = ("observed", "found", "extra", "residual")  # statistics of the linear policy that CMA-ES searches
-MARKS = (1, 8, 16, 24, 32, 44)  # rounds of a search that are printed
+MARKS = (1, 8, 16, 24, 32, 48, 64, 88)  # rounds of a search that are printed
 # the parameters that are searched: those of detections, motion and existence
 SEARCHED = {
     "blob": (
@@ -98,6 +104,9 @@ RULES = {
         "minimum_consecutive_frames": {"extra": 0.6, "bias": -0.15},
     },
 }  # fmt: skip
+
+
+Given = tuple[Policy, Array]  # a policy, and what is added to its residuals (P,)
 
 
 @dataclass(frozen=True)
@@ -138,7 +147,11 @@ class Bench:
         kind = config_class(self.tracker, name)
         self.space = tuple(p for p in space_of(kind, "file", online=True) if p.name in SEARCHED[name])
         self.base = kind()
-        self.still = Policy(self.base, EVERY, MEMORY, {p.name: {} for p in self.space})
+        self.still = self.constant(self.base)
+
+    def constant(self, config: Config) -> Policy:
+        """Returns the policy that keeps a config."""
+        return Policy(config, EVERY, MEMORY, {p.name: {} for p in self.space})
 
     def env(self, scene: Scene, reward: Reward = "window") -> TuningEnv:
         """Returns an environment of one scene."""
@@ -195,7 +208,9 @@ class Search:
         return np.maximum.accumulate(self.means).tolist()  # type: ignore[no-any-return]
 
 
-def by_optuna(search: Search, sampler: Any, rounds: int, size: int, made: Callable[[Array], Any]) -> list[Any]:
+def by_optuna(
+    search: Search, sampler: Any, rounds: int, size: int, made: Callable[[Array], Given]
+) -> list[tuple[Given, list[Played]]]:
     """Returns what is made of each of `rounds` vectors (size,) in [-1, 1], 0 first, that a sampler of Optuna asks for,
     and what it plays; made(vector): a policy and its offset."""
     import optuna
@@ -223,17 +238,17 @@ def cma(size: int) -> Any:
     )
 
 
-def linear(bench: Bench, mean: Array, sd: Array) -> Callable[[Array], tuple[Policy, Array]]:
+def linear(bench: Bench, base: Config, mean: Array, sd: Array) -> Callable[[Array], Given]:
     """Returns what makes a policy of weights (P (1 + S),), each of a standardised statistic of TOLD; mean, sd (S,)."""
     still = np.zeros(len(bench.space))
 
-    def made(vector: Array) -> tuple[Policy, Array]:
+    def made(vector: Array) -> Given:
         rows = {}
         for p, (first, *others) in zip(bench.space, vector.reshape(len(bench.space), -1), strict=True):
             weights = {name: float(w / d) for name, w, d in zip(TOLD, others, sd, strict=True)}
             bias = first - sum(w * m for w, m in zip(weights.values(), mean, strict=True))
             rows[p.name] = {BIAS: float(bias), **weights}
-        return Policy(bench.base, EVERY, MEMORY, rows, LIMIT), still
+        return Policy(base, EVERY, MEMORY, rows, LIMIT), still
 
     return made
 
@@ -246,37 +261,40 @@ def adaptation(name: str, configs: int, train: range, seeds: range, picture: Pat
     drifting, *others = (playable(bench, scenes(suite, train)) for suite in TRAINING)
     training = [*drifting, *(scene for each in others for scene in each)]
     size, still = len(bench.space), np.zeros(len(bench.space))
+    rounds = rounds_of(configs)
     searches = {key: Search(bench, training) for key in ("random", "TPE", "CMA", "linear by CMA", "policy")}
-    policy, _ = searched_policy(searches["policy"].play, bench.base, bench.space, configs, SEED, lambda text: None)
-    rounds = len(searches["policy"].means)
     drawn = drawn_residuals(bench.space, rounds, np.random.default_rng(SEED))
+    longer = by_optuna(searches["TPE"], TPESampler(seed=SEED), 2 * rounds, size, lambda x: (bench.still, x))
     pools = {
         "random": [((bench.still, each), searches["random"].play(bench.still, each)) for each in drawn],
-        "TPE": by_optuna(searches["TPE"], TPESampler(seed=SEED), rounds, size, lambda x: (bench.still, x)),
+        "TPE": longer[:rounds],
         "CMA": by_optuna(searches["CMA"], cma(size), rounds, size, lambda x: (bench.still, x)),
     }
-    seen = np.concatenate([one.seen[:-1] for one in pools["random"][0][1]])[:, [NAMES.index(each) for each in TOLD]]
-    weighted = linear(bench, seen.mean(axis=0), np.maximum(seen.std(axis=0), 0.01))
+    best = {key: best_of(pool) for key, pool in {**pools, "TPE, twice": longer}.items()}
+    constant = max(pools, key=lambda key: mean_objective(best[key][1]))
+    base = decode(bench.space, moved(bench.space, best[constant][0][1], bench.base), bench.base)
+    policy, _ = searched_policy(searches["policy"].play, base, bench.space, configs, SEED, lambda text: None)
+    seen = np.concatenate([one.seen[:-1] for one in best[constant][1]])[:, [NAMES.index(each) for each in TOLD]]
+    weighted = linear(bench, base, seen.mean(axis=0), np.maximum(seen.std(axis=0), 0.01))
     dimensions = size * (1 + len(TOLD))
     lines = by_optuna(searches["linear by CMA"], cma(dimensions), rounds, dimensions, weighted)
-    best = {key: max(pool, key=lambda one: mean_objective(one[1])) for key, pool in {**pools, "lines": lines}.items()}
-    constant = max(pools, key=lambda key: mean_objective(best[key][1]))
     every = [one for pool in pools.values() for one in pool]
     parts = best_by_part(drifting, [played[: len(drifting)] for _, played in every])
     residuals = np.array([offset for (_, offset), _ in every])
-    rule = Policy(bench.base, EVERY, MEMORY, RULES[name], LIMIT)
+    rule = Policy(base, EVERY, MEMORY, RULES[name], LIMIT)
     known = {
-        "defaults": (bench.still, still), **{key: best[key][0] for key in pools}, "rule": (rule, None),
-        "linear by CMA": best["lines"][0], "policy": (policy, None),
+        "defaults": (bench.still, still), **{key: given for key, (given, _) in best.items()}, "rule": (rule, None),
+        "linear by CMA": best_of(lines)[0], "policy": (policy, None),
     }  # fmt: skip
     print(f"\n{name}: {rounds} rounds of {len(training)} training scenes; the best constant is that of {constant}")
-    head(["search", *(f"{k} rounds" for k in MARKS if k <= rounds)])
+    head(["search", *(f"{k} rounds" for k in MARKS if k <= 2 * rounds)])
     for key, search in searches.items():
-        row([key, *(f"{search.best[k - 1]:.3f}" for k in MARKS if k <= rounds)])
+        row([key, *(f"{search.best[k - 1]:.3f}" if k <= len(search.best) else "–" for k in MARKS if k <= 2 * rounds)])
     print(f"\n{policy.to_toml()}", flush=True)
     if curve is not None:
         x = list(range(1, rounds + 1))
-        panel = chart.Panel(f"{name}, training scenes", x, {key: s.best for key, s in searches.items()}, "rounds")
+        curves = {key: search.best[:rounds] for key, search in searches.items()}
+        panel = chart.Panel(f"{name}, training scenes", x, curves, "rounds")
         chart.lines([panel], curve)
     for suite in SUITES:
         test = playable(bench, scenes(suite, seeds))
@@ -296,6 +314,16 @@ def adaptation(name: str, configs: int, train: range, seeds: range, picture: Pat
                 row([entry, *(f"{np.mean([values[k] for k in mine]):.3f}" for values in found.values())])
         if suite == "drift" and picture is not None:
             draw(bench, test[0], policy, picture)
+
+
+def rounds_of(configs: int) -> int:
+    """Returns how often the search for a linear policy plays all training scenes."""
+    return configs + configs // 2 + 2 * len(FITS)
+
+
+def best_of(pool: Sequence[tuple[Given, list[Played]]]) -> tuple[Given, list[Played]]:
+    """Returns what has the best mean objective."""
+    return max(pool, key=lambda one: mean_objective(one[1]))
 
 
 def best_by_part(training: Sequence[Scene], pool: Sequence[Sequence[Played]]) -> dict[tuple[str, int], int]:
@@ -318,13 +346,13 @@ def draw(bench: Bench, scene: Scene, policy: Policy, out: Path) -> None:
     import matplotlib
     from matplotlib.figure import Figure
 
-    played, still = bench.play(scene, policy), bench.play(scene, bench.still)
+    played, still = bench.play(scene, policy), bench.play(scene, bench.constant(policy.base))
     t = EVERY * np.arange(len(played.seen))
     moved = np.array([policy.residual(seen) for seen in played.seen])
     panels = (
         ("statistics, averaged", t, {name: played.seen[:, NAMES.index(name)] for name in TOLD}),
         ("residual of a parameter", t, {p.name: column for p, column in zip(policy.space, moved.T, strict=True)}),
-        ("objective of a window", t[1:], {"policy": played.score, "defaults": still.score}),
+        ("objective of a window", t[1:], {"policy": played.score, "best constant": still.score}),
     )
     with matplotlib.rc_context(chart.STYLE):
         figure = Figure(figsize=(9.6, 8.0), layout="constrained")

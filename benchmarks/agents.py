@@ -31,7 +31,7 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from benchmarks.adaptation import LIMIT, SEARCHED, SUITES, TRAINING, Bench, Scene, Search, playable, scenes
+from benchmarks.adaptation import LIMIT, SEARCHED, SUITES, TRAINING, Bench, Scene, Search, playable, rounds_of, scenes
 from benchmarks.peers.environments import DEFAULT, make_environments
 from benchmarks.support import chart
 from benchmarks.support.options import add_seeds, add_trackers, new_parser, one_thread, seeds_text
@@ -40,7 +40,7 @@ from scenarios.errors import InputError
 from sim.types import Array
 from tracking.environment.env import Floats, Reward, TuningEnv
 from tracking.running.policy import Policy
-from tracking.tuning.adaptive import EVERY, FITS, searched_policy
+from tracking.tuning.adaptive import EVERY, searched_policy
 
 ALGORITHMS = "PPO", "SAC", "linear"
 GAMMA: dict[Reward, float] = {"window": 0.99, "prefix": 1.0}
@@ -181,11 +181,6 @@ def learn(name: str, algorithms: Sequence[str], seeds: int, train: range, test: 
         results.add(f"{name}/{algorithm}/{seed}", run)
         means = ", ".join(f"{suite} {np.nanmean([*run[suite].values()]):.3f}" for suite in SUITES)
         print(f"{name}, {algorithm}, seed {seed}: {means}; {(time.perf_counter() - begun) / 60:.1f} min", flush=True)
-
-
-def rounds_of(configs: int) -> int:
-    """Returns how often the search for a linear policy plays all training scenes."""
-    return configs + configs // 2 + 2 * len(FITS)
 
 
 def compare(name: str, algorithms: Sequence[str], seeds: int, results: Results) -> None:
