@@ -1,19 +1,17 @@
-"""What does a search reach with its own sampler and stopping rule, and what with Optuna's, in equal CPU time?
+"""What does a search reach with its own sampler, and what with Optuna's samplers and pruner, in equal CPU time?
 
     python -m benchmarks samplers [METHOD …] [--trackers …] [--suites …] [--searches 0:2] [--training 2]
                                   [--trials 30] [--state FILE.json] [--libraries FOLDER]
 
 Each search tunes one tracker on one suite of short scenes, at 2.5 frames/s. Search k has training scenes and test
 scenes of its own. All methods begin with the defaults and get the same budget: the CPU seconds in which the search's
-own sampler plays 30 trials without stopping any. Seconds are of the whole loop: sampler, storage, tracker and scores.
-An episode that another method has played already is not played again, but its seconds count.
+own sampler plays 30 trials. Seconds are of the whole loop: sampler, storage, tracker and scores. An episode that
+another method has played already is not played again, but its seconds count.
 
-ours             moved parents; trials that surely lose are stopped (the default of `tune`)
-ours-whole       the same, no trial is stopped
-ours-wilcoxon    the same, stopped by Optuna's WilcoxonPruner
-ours-tpe         every fourth trial is drawn by TPE, no trial is stopped
-tpe, tpe-single  Optuna's TPESampler, as it is (multivariate) and univariate; no trial is stopped
-tpe-wilcoxon     TPE, stopped by Optuna's WilcoxonPruner
+ours             moved parents
+ours-wilcoxon    the same; Optuna's WilcoxonPruner stops trials that surely lose to the best one
+tpe, tpe-single  Optuna's TPESampler, as it is (multivariate) and univariate
+tpe-wilcoxon     TPE, and Optuna's WilcoxonPruner
 cma-es           Optuna's CmaEsSampler from the defaults on; categorical parameters are drawn at random
 random           Optuna's RandomSampler
 
@@ -35,20 +33,23 @@ from typing import Any
 
 import numpy as np
 import optuna
+from optuna.pruners import WilcoxonPruner
 from optuna.samplers import BaseSampler, CmaEsSampler, RandomSampler, TPESampler
-from optuna.trial import TrialState, create_trial
+from optuna.study import StudyDirection
+from optuna.trial import create_trial
 
 from benchmarks.peers.environments import DEFAULT, make_environments
 from benchmarks.support.follower import Follower
 from benchmarks.support.options import add_seeds, new_parser
 from benchmarks.support.replaced_code import Replacement, replaced_code
 from benchmarks.support.tables import difference_cell, number, table
-from scenarios.errors import FlockscopeError
+from scenarios.errors import FlockscopeError, InputError
 from sim.types import Tracker
 from tracking.episodes.episode import Episode, Source
 from tracking.episodes.parallel_episodes import EpisodeOrError
 from tracking.stats import mean_of_known
-from tracking.tuning import sampler, study
+from tracking.tuning import study
+from tracking.tuning.candidates import Goal
 from tracking.tuning.episode_player import PlayEpisodes, episode_player
 from tracking.tuning.options import TuneOptions
 from tracking.tuning.search_plan import SearchPlan, search_plan
@@ -67,7 +68,8 @@ SUITES: dict[str, tuple[tuple[str, ...], int]] = {
 }  # fmt: skip
 PARTS = (0.25, 0.5, 1.0)  # of the budget
 MANY = 10**6  # trials, more than any budget buys
-REFERENCE, WHOLE = "ours", "ours-whole"
+REFERENCE = "ours"
+LIMIT = 0.1  # p-value below which Optuna's pruner stops a trial
 
 
 Propose = Callable[[SearchPlan, optuna.Study, int], None]
@@ -105,19 +107,66 @@ class Episodes:
             self.played[key] = found, time.process_time() - start
         return self.played[key][0]
 
-    def until(self, clock: Clock, budget: float) -> PlayEpisodes:
-        """Returns the player of one search, which raises SpentError after `budget` s."""
+    def until(self, clock: Clock, budget: float, pruner: Pruner | None = None) -> PlayEpisodes:
+        """Returns the player of one search, which raises SpentError after `budget` s. A trial that the pruner stops has
+        no value."""
 
         def play(
             sources: Sequence[Source], values: dict[str, Any], every: bool
         ) -> Generator[EpisodeOrError, None, None]:
-            for source in sources:
-                found = self.one(source, values, clock)
+            played = dict[int, Episode]()
+            for k in range(len(sources)) if pruner is None else pruner.order(len(sources)):
+                found = self.one(sources[k], values, clock)
                 if clock.now() > budget:
                     raise SpentError
-                yield found
+                if isinstance(found, FlockscopeError):
+                    yield found
+                    return
+                played[k] = found
+                if pruner is not None and pruner.stops(played):
+                    yield InputError(place="trial", got="a sure loss", expected="a better one", remedy="none")
+                    return
+            if pruner is not None:
+                pruner.ended(played)
+            yield from (played[k] for k in range(len(sources)))
 
         return play
+
+
+class Pruner:
+    """Optuna's WilcoxonPruner for the trials of a goal. State: number of trials; values of the best whole one by number
+    of the scene."""
+
+    def __init__(self, goal: Goal) -> None:
+        self.goal, self.trials, self.best = goal, 0, dict[int, float]()
+        with study.quiet_optuna():
+            self.pruner = WilcoxonPruner(p_threshold=LIMIT)
+
+    def order(self, scenes: int) -> list[int]:
+        """Returns the scenes of a new trial in an order of its own, so that no few scenes decide about all trials."""
+        self.trials += 1
+        return np.random.default_rng(self.trials).permutation(scenes).tolist()  # type: ignore[no-any-return]
+
+    def stops(self, played: Mapping[int, Episode]) -> bool:
+        """Returns True if a trial surely loses by the episodes that it has played."""
+        now = {k: value for k, value in self._known(played).items() if k in self.best}
+        direction = StudyDirection.MAXIMIZE if self.goal.higher else StudyDirection.MINIMIZE
+        stand_in: Any = type("Record", (), {"direction": direction, "best_trial": _trial(self.best)})
+        return bool(self.best and self.pruner.prune(stand_in, _trial(now)))
+
+    def ended(self, played: Mapping[int, Episode]) -> None:
+        """Takes a trial that was played to its end."""
+        now = self._known(played)
+        if not self.best or self.goal.gain(mean_of_known(self.best.values()), mean_of_known(now.values())) > 0:
+            self.best = now
+
+    def _known(self, played: Mapping[int, Episode]) -> dict[int, float]:
+        values = {k: self.goal.of(episode) for k, episode in played.items()}
+        return {k: value for k, value in values.items() if value == value}
+
+
+def _trial(values: Mapping[int, float]) -> optuna.trial.FrozenTrial:
+    return create_trial(value=0.0, intermediate_values=dict(values))
 
 
 def by(make: Callable[[SearchPlan, int], BaseSampler]) -> tuple[object, str, Propose]:
@@ -131,56 +180,22 @@ def by(make: Callable[[SearchPlan, int], BaseSampler]) -> tuple[object, str, Pro
     return study, "propose", propose
 
 
-def fourth_by_tpe(plan: SearchPlan, record: optuna.Study, number: int) -> None:
-    """Lets TPE draw every fourth trial once ten are complete; the others are moved parents."""
-    complete = record.get_trials(deepcopy=False, states=(TrialState.COMPLETE,))
-    if number % 4 == 3 and len(complete) >= 10:
-        TPE[2](plan, record, number)
-    else:
-        sampler.propose(plan, record, number)
-
-
 def cma_es(plan: SearchPlan, seed: int) -> BaseSampler:
     """Returns CMA-ES that begins at the defaults."""
     start = {p.name: plan.defaults[p.name] for p in plan.space if p.scale != "categorical"}
     return CmaEsSampler(x0=start, seed=seed, warn_independent_sampling=False)
 
 
-def estimate_by_optuna(made: study.SearchStudy, played: dict[int, Episode]) -> float | None:
-    """Returns an estimate of a trial that Optuna's WilcoxonPruner stops, as the search estimates those that it stops
-    itself; None if it goes on."""
-    goal = made.plan.goals[0]
-    if not any(t.state == TrialState.COMPLETE for t in made.finished()):
-        return None
-    best = made.optuna.best_trial
-    known = {k: v for k, v in enumerate(best.user_attrs[study.SCENES]) if v == v}
-    now = {k: goal.of(e) for k, e in played.items() if k in known and goal.of(e) == goal.of(e)}
-    direction = made.optuna.direction
-    stand_in: Any = type("Record", (), {"direction": direction, "best_trial": whole(known)})
-    if not optuna.pruners.WilcoxonPruner(p_threshold=made.plan.options.prune).prune(stand_in, whole(now)):
-        return None
-    loss = max(-mean_of_known(goal.gain(known[k], v) for k, v in now.items()), study.LEAST_LOSS)
-    return float(best.value - loss if goal.higher else best.value + loss)
-
-
-def whole(values: Mapping[int, float]) -> optuna.trial.FrozenTrial:
-    """Returns a trial with these values by number of the scene."""
-    return create_trial(value=0.0, intermediate_values=dict(values))
-
-
-BY_OPTUNA = (study, "_estimate_if_losing", estimate_by_optuna)
 TPE = by(lambda plan, seed: TPESampler(seed=seed))
-# By method: what is replaced in the search, and the p-value that stops a trial.
-METHODS: dict[str, tuple[tuple[Replacement, ...], float]] = {
-    WHOLE: ((), 0.0),  # first: its seconds are the budget
-    REFERENCE: ((), TuneOptions.prune),
-    "ours-wilcoxon": ((BY_OPTUNA,), TuneOptions.prune),
-    "ours-tpe": (((study, "propose", fourth_by_tpe),), 0.0),
-    "tpe": ((TPE,), 0.0),
-    "tpe-single": ((by(lambda plan, seed: TPESampler(seed=seed, multivariate=False)),), 0.0),
-    "tpe-wilcoxon": ((TPE, BY_OPTUNA), TuneOptions.prune),
-    "cma-es": ((by(cma_es),), 0.0),
-    "random": ((by(lambda plan, seed: RandomSampler(seed=seed)),), 0.0),
+# By method: what is replaced in the search, and whether a pruner stops trials.
+METHODS: dict[str, tuple[tuple[Replacement, ...], bool]] = {
+    REFERENCE: ((), False),
+    "ours-wilcoxon": ((), True),
+    "tpe": ((TPE,), False),
+    "tpe-single": ((by(lambda plan, seed: TPESampler(seed=seed, multivariate=False)),), False),
+    "tpe-wilcoxon": ((TPE,), True),
+    "cma-es": ((by(cma_es),), False),
+    "random": ((by(lambda plan, seed: RandomSampler(seed=seed)),), False),
 }
 
 
@@ -207,8 +222,9 @@ class Cell:
 
     def searched(self, method: str, trials: int, budget: float) -> Searched:
         """Plays a search until so many trials are finished or the budget, CPU s, is spent."""
-        changes, prune = METHODS[method]
-        plan = replace(self.plan, options=replace(self.plan.options, prune=prune, trials=trials))
+        changes, stops = METHODS[method]
+        plan = replace(self.plan, options=replace(self.plan.options, trials=trials))
+        pruner = Pruner(plan.goals[0]) if stops else None
         clock, ends = Clock(), list[float]()
 
         def progress(finished: int, planned: int | None, text: str) -> None:
@@ -216,13 +232,13 @@ class Cell:
 
         with replaced_code(changes), study.open_study(plan, None, "samplers") as made:
             with suppress(SpentError):
-                study.run_trials(made, self.episodes.until(clock, budget), progress)
+                study.run_trials(made, self.episodes.until(clock, budget, pruner), progress)
             spent = min(budget, clock.now())
             records = made.records()[: len(ends)]
         goal, training, test = plan.goals[0], list[float](), list[float]()
         for part in PARTS:
             done = [r for r, end in zip(records, ends, strict=True) if end <= part * spent]
-            ranked = [r for r in done if not r.pruned and not r.error] or records[:1]
+            ranked = [r for r in done if not r.error] or records[:1]
             best = max(ranked, key=lambda r: goal.gain(0.0, r.values[0]))
             training.append(best.values[0])
             test.append(self.tested(best.params))
@@ -263,7 +279,7 @@ def play_methods(key: Key, methods: Sequence[str], found: Found, state: Path | N
     with episode_player(plan.tracker, plan.detections) as play:
         cell = Cell(plan, play)
         for method in (method for method in methods if method not in mine):
-            budget = (key[-1], float("inf")) if method == WHOLE else (MANY, mine[WHOLE].seconds)
+            budget = (key[-1], float("inf")) if method == REFERENCE else (MANY, mine[REFERENCE].seconds)
             mine[method] = one = cell.searched(method, *budget)
             values = " ".join(f"{v:.4f}" for v in (*one.training, *one.test, one.defaults))
             print(*key, method, f"{one.trials} trials, {one.seconds:.1f} s, {values}", flush=True)
@@ -327,14 +343,14 @@ def main() -> None:
     parser.add_argument("--suites", nargs="+", default=list(SUITES), choices=SUITES)
     add_seeds(parser, "0:2", "--searches", "numbers of the searches of each tracker and suite: ")
     parser.add_argument("--training", type=int, default=2, help="training seeds of each scene")
-    parser.add_argument("--trials", type=int, default=30, help="trials of `ours-whole`, whose CPU time is the budget")
+    parser.add_argument("--trials", type=int, default=30, help="trials of `ours`, whose CPU time is the budget")
     parser.add_argument("--state", type=Path, help="file that keeps finished searches")
     parser.add_argument("--libraries", type=Path, default=DEFAULT, help="where the library of CMA-ES is installed")
     args = parser.parse_args()
     unknown = [name for name in args.methods if name not in METHODS]
     if unknown:
         parser.error(f"{unknown[0]}: choose from {', '.join(METHODS)}")
-    methods = [name for name in METHODS if name in (WHOLE, REFERENCE, *args.methods)]
+    methods = [name for name in METHODS if name in (REFERENCE, *args.methods)]
     if "cma-es" in methods and not make_environments(args.libraries, ("cmaes",))["cmaes"]:
         methods.remove("cma-es")
         print("left out: cma-es, whose library cannot be installed")

@@ -1,20 +1,17 @@
-"""The benchmark of samplers: what an episode costs is counted once, whoever plays it; what a budget buys; and whether a
-trial is stopped as Optuna's pruner stops it."""
+"""The benchmark of samplers: what an episode costs is counted once, whoever plays it; what a budget buys; and which
+trials Optuna's pruner stops."""
 
 from __future__ import annotations
 
 from contextlib import nullcontext
 from dataclasses import replace
 
-import optuna
 import pytest
-from optuna.trial import TrialState
 
 from benchmarks import samplers
-from benchmarks.samplers import METHODS, WHOLE, Cell, Clock, Episodes, SpentError, estimate_by_optuna, report
+from benchmarks.samplers import METHODS, Cell, Clock, Episodes, Pruner, SpentError, report
 from tests.tuning_toys import toy_plan
 from tracking.episodes.episode import Episode
-from tracking.tuning.study import SCENES, open_study
 
 
 class Counted:
@@ -51,7 +48,7 @@ def test_a_budget_buys_as_many_trials_with_every_method(tmp_path, monkeypatch, m
     pytest.importorskip("cmaes") if method == "cma-es" else None
     plan, play = toy_plan(tmp_path, seeds=range(2), only=["skip", "reach"], set=["colour=red"]), Counted(monkeypatch)
     cell = Cell(plan, play)
-    assert cell.searched(WHOLE, 10, float("inf")).seconds == 20
+    assert cell.searched("ours", 10, float("inf")).seconds == 20
     found = cell.searched(method, 10**6, 20.0)
     assert found.trials == 10
     assert found.training[0] <= found.training[1] <= found.training[2]
@@ -69,7 +66,7 @@ def test_a_part_of_the_budget_counts_the_trials_that_ended_in_it(tmp_path, monke
 
     cell = Cell(toy_plan(tmp_path, seeds=range(2), only=["reach"]), better)
     begun = play.seconds
-    found = cell.searched(WHOLE, 10, float("inf"))
+    found = cell.searched("ours", 10, float("inf"))
     assert [1000 * value - begun for value in found.training] == pytest.approx([3.5, 9.5, 19.5])
     assert found.test == tuple(sorted(found.test))
 
@@ -82,18 +79,25 @@ LOST = [([-0.1] * 3, False), ([-0.1] * 4, True), ([0.1] * 4, False), ([0.0] * 5,
 def test_optunas_pruner_stops_a_sure_loss(tmp_path, gains, stopped, objective):
     plan = toy_plan(tmp_path, seeds=range(6), objective=objective)
     sign = 1 if objective == "HOTA" else -1
-    with open_study(plan, None, "x") as study:
-        first = study.ask()
-        assert estimate_by_optuna(study, {0: Episode("one", 0, 0.0, {objective: 0.5}, 1, 1.0)}) is None
-        first.set_user_attr(SCENES, [0.5] * 6)
-        study.tell(first, [0.5])
-        assert study.trials()[0].state == TrialState.COMPLETE
-        played = {k: Episode("one", k, 0.0, {objective: 0.5 + sign * gain}, 1, 1.0) for k, gain in enumerate(gains)}
-        found = estimate_by_optuna(study, played)
-        assert (found is not None) == stopped
-        if stopped:
-            assert found == pytest.approx(0.5 + sign * sum(gains) / len(gains))
-    assert optuna.logging.get_verbosity() != optuna.logging.ERROR
+    pruner = Pruner(plan.goals[0])
+
+    def episodes(values):
+        return {k: Episode("one", k, 0.0, {objective: value}, 1, 1.0) for k, value in enumerate(values)}
+
+    assert not pruner.stops(episodes([0.5]))
+    pruner.ended(episodes([0.5] * 6))
+    assert pruner.stops(episodes([0.5 + sign * gain for gain in gains])) == stopped
+    pruner.ended(episodes([0.5 - sign * 0.1] * 6))  # worse: the best one stays
+    assert pruner.best == dict.fromkeys(range(6), 0.5)
+
+
+def test_a_stopped_trial_has_no_value_and_costs_less(tmp_path, monkeypatch):
+    play = Counted(monkeypatch)
+    cell = Cell(toy_plan(tmp_path, seeds=range(6), only=["skip"]), play)
+    budget = cell.searched("ours", 30, float("inf")).seconds
+    found = cell.searched("ours-wilcoxon", 10**6, budget)
+    assert found.trials > 30
+    assert found.training[2] == pytest.approx(0.5 + 0.02 * sum(k % 5 for k in range(6)) / 6)
 
 
 def test_the_tables_pair_searches(capsys):
@@ -114,13 +118,13 @@ def test_a_run_goes_on_where_it_ended(tmp_path, monkeypatch):
     monkeypatch.setattr(samplers, "episode_player", lambda *given: nullcontext(play))
     key, state = ("toy", "one", 0, 2, 6), tmp_path / "state.json"
     found = samplers.read(state)
-    samplers.play_methods(key, [WHOLE, "ours"], found, state)
+    samplers.play_methods(key, ["ours", "tpe"], found, state)
     played = play.episodes
     again = samplers.read(state)
     assert again == {key: {m: replace(o, test=list(o.test), training=list(o.training)) for m, o in found[key].items()}}
-    samplers.play_methods(key, [WHOLE, "ours"], again, state)
+    samplers.play_methods(key, ["ours", "tpe"], again, state)
     assert play.episodes == played
     ours = again[key]["ours"]
-    samplers.play_methods(key, [WHOLE, "ours", "random"], again, state)
+    samplers.play_methods(key, ["ours", "tpe", "random"], again, state)
     assert again[key]["ours"] is ours
-    assert samplers.read(state)[key]["random"].seconds == found[key][WHOLE].seconds
+    assert samplers.read(state)[key]["random"].seconds == found[key]["ours"].seconds

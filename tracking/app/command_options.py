@@ -315,7 +315,6 @@ class TuneCommandOptions(WorkerOptions, words="tune"):
     storage: str | None = tuned("storage")
     study: str | None = tuned("study")
     step_timeout: float | None = STEP_TIMEOUT()
-    prune: float = tuned("prune")
     finalists: int = tuned("finalists")
     seed: int = tuned("seed")
     fresh: bool = FRESH()

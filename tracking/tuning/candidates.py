@@ -85,10 +85,8 @@ class TrialRecord:
     """A finished trial of a search: one set of parameters, played on the training scenes."""
 
     number: int  # its place in the search, 0 for the defaults
-    values: tuple[float, ...]  # one per goal; an estimate if pruned, empty if its parameters are impossible
+    values: tuple[float, ...]  # one per goal; empty if its parameters are impossible
     params: dict[str, Any]  # of each searched parameter by name
-    episodes: int  # training episodes played, 0 if the parameters are impossible
-    pruned: bool = False  # stopped before its last training scene
     error: str = ""  # why its parameters are impossible
 
 

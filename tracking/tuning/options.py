@@ -56,8 +56,6 @@ class TuneOptions:
         "Scheduler of a dask cluster that plays the episodes.", None, metavar="tcp://HOST:PORT")
     step_timeout: float | None = option(
         "Seconds that a reset or step may take; a longer one makes the trial impossible.", None, metavar="SECONDS")
-    prune: float = option(
-        "Stop a trial whose loss has a p-value below this; 0: never.", 0.1, low=0, below=1, metavar="P")
     finalists: int = option("Number of best trials that validation chooses from.", 5, low=1, metavar="N")
     seed: int = option("Seed of the search.", 0, low=0)
     fresh: bool = option("Ignore and remove what an earlier search stored under this name.", False)

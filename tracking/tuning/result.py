@@ -3,7 +3,7 @@
 No file holds a time, a host or a folder: the same search writes the same bytes.
 
 The plots, by matplotlib, are the history of the trials and the importance of the parameters.
-Optuna's own plots show pruned estimates and training values as if they were results.
+Optuna's own plots show training values as if they were results.
 """
 
 from __future__ import annotations
@@ -15,6 +15,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from scenarios.errors import counted
 from sim.hashing import installed
 from sim.store.atomic import write_file
@@ -25,32 +27,29 @@ from tracking.tuning.candidates import Candidate, Comparison, TrialRecord
 from tracking.tuning.search_plan import SearchPlan, seeds_text
 
 BLUE, ORANGE = "#0b6bcb", "#d4600a"
-ROOM = 0.15  # Share of the range of the values that is shown beyond them; worse values are marked at the edge.
+SHOWN = 1.0  # Of the range from the best value to the worst quarter: what is shown beyond; worse ones are marked.
 
 
 def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
     """Returns an SVG text: plot of the first goal's training value of every trial, in the order of the search."""
     goal, trials = plan.goals[0], [t for t in records if t.values]
     figure, axes = _figure(f"{_title(plan)}: {counted(len(records), 'trial')}")
-    played = [t for t in trials if not t.pruned]
-    for some, face, words in (
-        (played, BLUE, "played to the end"), ([t for t in trials if t.pruned], "none", "pruned, estimated")
-    ):  # fmt: skip
-        axes.scatter([t.number for t in some], [t.values[0] for t in some], facecolor=face, edgecolor=BLUE, label=words)
-    best = [t.values[0] for t in played[:1]]
-    for t in played[1:]:
-        best.append(t.values[0] if goal.gain(best[-1], t.values[0]) > 0 else best[-1])
-    axes.step([t.number for t in played], best, where="post", color=ORANGE, label="best so far")
-    for t in played:
+    numbers, values = [t.number for t in trials], [t.values[0] for t in trials]
+    axes.scatter(numbers, values, color=BLUE, label="trials")
+    best = values[:1]
+    for value in values[1:]:
+        best.append(value if goal.gain(best[-1], value) > 0 else best[-1])
+    axes.step(numbers, best, where="post", color=ORANGE, label="best so far")
+    for t in trials:
         if t.params == plan.defaults:
             axes.axhline(t.values[0], color="grey", linestyle="--", label="defaults")
-    values = [t.values[0] for t in played]
-    if values and min(values) < max(values):  # a trial that loses by far would flatten the rest
-        worst = min(values) if goal.higher else max(values)
-        edge = worst + (worst - (max(values) + min(values)) / 2) * 2 * ROOM
+    if values:  # trials that lose by far would flatten the rest
+        bad = float(np.quantile(values, 0.25 if goal.higher else 0.75))
+        edge = bad + SHOWN * (bad - best[-1])
         beyond = [t.number for t in trials if goal.gain(edge, t.values[0]) < 0]
-        axes.plot(beyond, [edge] * len(beyond), "|", color=BLUE, label="far worse" if beyond else None)
-        axes.set_ylim(**{"bottom" if goal.higher else "top": edge})
+        if beyond and bad != best[-1]:
+            axes.plot(beyond, [edge] * len(beyond), "|", color=BLUE, label="far worse")
+            axes.set_ylim(**{"bottom" if goal.higher else "top": edge})
     axes.set(xlabel="trial", ylabel=f"{goal.key}, training scenes (optimised: no result)")
     axes.legend(fontsize=8)
     return _svg(figure)
@@ -106,7 +105,7 @@ class TuningResult:
         front: With several goals, the candidates that no other dominates, sorted by the first goal, best first; with
             one goal ().
         candidates: The defaults, then the best trials, with their values on the validation scenes.
-        trials: All finished trials in the order of the search, with those stopped early and impossible ones.
+        trials: All finished trials in the order of the search, with impossible ones.
         importance: By parameter, the share (0 to 1) of the first goal's training values that it explains.
         comparisons: Comparisons of the winner with the defaults on the test scenes; () if the defaults won.
         validation: The values on the validation scenes, one per goal: a tuple of the defaults, then of the winner.
@@ -143,12 +142,8 @@ class TuningResult:
 
     @property
     def counts(self) -> dict[str, int]:
-        """By name: numbers of "trials", of training "episodes" played in them, of trials that were stopped early
-        ("pruned"), and of "impossible" trials, whose parameters the tracker refused or failed with."""
-        return {
-            "trials": len(self.trials), "episodes": sum(t.episodes for t in self.trials),
-            "pruned": sum(t.pruned for t in self.trials), "impossible": sum(bool(t.error) for t in self.trials),
-        }  # fmt: skip
+        """Numbers of "trials" and of "impossible" ones, whose parameters the tracker refused or failed with."""
+        return {"trials": len(self.trials), "impossible": sum(bool(t.error) for t in self.trials)}
 
     def __str__(self) -> str:
         """Returns the lines of `lines()` (settings, counts, values, comparisons, notes) as one text."""
@@ -161,11 +156,10 @@ class TuningResult:
         names = ", ".join(goal.key for goal in plan.goals)
         chosen_similarity = plan.options.similarity
         compared = "" if chosen_similarity is None else f", people compared by {chosen_similarity}"
-        counts, every = self.counts, len(self.trials) * len(plan.training)
+        counts, scenes = self.counts, counted(len(plan.training), "episode")
         lines = [
             f"{plan.tracker_name} tuned on {plan.suite_name}, detections {plan.detections}, for {names}{compared}",
-            f"{counted(counts['trials'], 'trial')}, {counts['episodes']} of {every} episodes played, "
-            f"{counts['pruned']} given up early, {counts['impossible']} impossible; "
+            f"{counted(counts['trials'], 'trial')} of {scenes}, {counts['impossible']} impossible; "
             f"training seeds {seeds['train']}, validation {seeds['val']}, test {seeds['test']}",
         ]
         if plan.scene_settings:

@@ -9,12 +9,8 @@ early in a search, and neither TPE nor CMA-ES surely more in all of it (`python 
 The parameters of trial n depend only on the seed, on n and on the trials finished before. A search that was killed and
 is resumed therefore finds what it would have found.
 
-A trial is stopped early when it surely loses to the best trial on the scenes that both were played on: the
-p-value of a paired test lies below a limit. The test is Wilcoxon's signed-rank test (1945), one-sided, as in Optuna's
-WilcoxonPruner. *Ours*: p-values are exact with ties and zeros, too. Parameters that change nothing in most scenes give
-zeros and ties; scipy then counts permutations, which takes longer than the episodes that are saved (`python -m
-benchmarks samplers ours-wilcoxon --training 4`). The test is repeated after each scene, so p is not the error rate of a
-whole trial.
+All trials are played to their end. Optuna's WilcoxonPruner, and the same test made faster, bought a fifth more trials
+in equal CPU time, and no better parameters.
 """
 
 from __future__ import annotations
@@ -31,8 +27,6 @@ from sim.types import Array
 from tracking.config import Param
 from tracking.parameter_space import decode, encode
 from tracking.tuning.search_plan import SearchPlan
-
-PRUNED = "pruned after"  # Attribute of a trial: episodes played before it was stopped.
 
 MOVED = 3  # Number of parameters that are moved, on average.
 STEPS = (0.05, 1.0)  # Least and greatest standard deviation of a step; the range of a parameter is [-1, 1].
@@ -75,40 +69,15 @@ def _moved(
 def _parent(
     plan: SearchPlan, study: optuna.Study, complete: Sequence[FrozenTrial], rng: np.random.Generator
 ) -> dict[str, Any]:
-    whole = [t for t in complete if PRUNED not in t.user_attrs]
-    if not whole:
+    if not complete:
         return dict(plan.defaults)
     if len(plan.goals) > 1:
         front = study.best_trials
         return dict(front[rng.integers(len(front))].params)
-    ranked = sorted(whole, key=lambda t: plan.goals[0].gain(t.values[0], 0.0))
+    ranked = sorted(complete, key=lambda t: plan.goals[0].gain(t.values[0], 0.0))
     return dict(ranked[min(int(rng.geometric(0.6)) - 1, PARENTS - 1, len(ranked) - 1)].params)
 
 
 def _reflected(point: Array) -> Array:
     # Beyond 3 or -3 the mirror image would land outside again, behind the other end.
     return np.clip(np.where(np.abs(point) > 1, np.sign(point) * 2 - point, point), -1.0, 1.0)
-
-
-LEAST_SCENES = 2
-
-
-def should_prune(gains: Sequence[float], p: float) -> bool:
-    """Returns True if a trial surely loses: at least 2 gains, a negative sum, and a signed-rank p-value below p. gains:
-    by how much the trial is better than the best one on each scene that both were played on."""
-    return len(gains) >= LEAST_SCENES and sum(gains) < 0 and signed_rank_p_value(gains) < p
-
-
-def signed_rank_p_value(gains: Sequence[float]) -> float:
-    """Returns the one-sided p-value of Wilcoxon's signed-rank test: small if the gains are mostly negative."""
-    d = np.asarray(gains, float)
-    _, place, count = np.unique(np.abs(d), return_inverse=True, return_counts=True)
-    last = np.cumsum(count)
-    doubled = (2 * last - count + 1)[place]  # twice the mean rank, which is an integer
-    signed = doubled[d != 0]
-    ways = np.zeros(int(signed.sum()) + 1)
-    ways[0] = 1.0
-    for rank in signed:
-        ways[rank:] = (ways[rank:] + ways[:-rank]) / 2
-        ways[:rank] /= 2
-    return float(ways[: int(doubled[d > 0].sum()) + 1].sum())

@@ -141,7 +141,7 @@ def _why_defaults(candidates: list[Candidate], goal: Goal) -> list[str]:
 
 
 def _candidates(plan: SearchPlan, study: SearchStudy) -> list[Candidate]:
-    played = [t for t in study.records() if not t.pruned and not t.error]
+    played = [t for t in study.records() if not t.error]
     defaults, goal, finalists = played[0], plan.goals[0], plan.options.finalists
     ranked = sorted(played, key=lambda t: goal.gain(t.values[0], 0.0))
     if len(plan.goals) > 1:

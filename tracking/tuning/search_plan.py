@@ -172,7 +172,6 @@ class SearchPlan:
             "searched": ", ".join(p.name for p in self.space),
             "ranges": _digest(repr(p) for p in self.space),
             "fixed": _digest(self.base.as_dict().items()),
-            "prune": self.options.prune,
             "seed": self.options.seed,
         }
 

@@ -7,9 +7,7 @@ is held while a trial is chosen and while lines are written. The lock FILE.trial
 The system releases the locks of a process that dies, so another process sees that its trial was abandoned, and plays
 it.
 
-`run_trials` is the loop of a search: one trial (set of parameters) after the other, each played on the training scenes
-until it surely loses. It surely loses if the p-value of a paired test against the best trial, after any scene, is below
-a limit. It then gets an estimate of its value.
+`run_trials` is the loop of a search: one trial (set of parameters) after the other, each played on the training scenes.
 """
 
 from __future__ import annotations
@@ -23,7 +21,6 @@ from contextlib import AbstractContextManager, closing, contextmanager, nullcont
 from pathlib import Path
 from typing import Any, cast
 
-import numpy as np
 import optuna
 from filelock import FileLock, Timeout
 from optuna.exceptions import UpdateFinishedTrialError
@@ -35,11 +32,10 @@ from optuna.trial import FrozenTrial, TrialState
 from scenarios.errors import FlockscopeError, InputError
 from tracking.episodes.episode import Episode
 from tracking.running.used_files import UsedFiles, changes, relative
-from tracking.stats import mean_of_known
 from tracking.tuning.candidates import STORED, TrialRecord
 from tracking.tuning.episode_player import PlayEpisodes
 from tracking.tuning.options import Progress
-from tracking.tuning.sampler import PRUNED, distribution, propose, should_prune
+from tracking.tuning.sampler import distribution, propose
 from tracking.tuning.search_plan import SearchPlan
 
 SQLITE = re.compile(r"sqlite(?:\+\w+)?:///(?!:memory:)([^?]+)(?:\?.*)?")  # URL of a file, which gets locks, too
@@ -95,11 +91,10 @@ def _journal(file: Path, lock: object) -> JournalStorage:
 
 SETTINGS = "settings"  # Attribute of a study that holds the identity of its plan.
 USED = "used"  # Attribute of a study that holds what its tracker has used, as `used_files.used`.
-# Attributes of a trial: why its parameters are impossible; the first goal's value of each training scene; of the first
-# trial: for each scene why it was left out, or "".
-ERROR, SCENES, LEFT_OUT = "error", "scenes", "left out"
+# Attributes of a trial: why its parameters are impossible; of the first trial: for each scene why it was left out.
+ERROR, LEFT_OUT = "error", "left out"
 
-# States of a finished trial. PRUNED means impossible parameters; one stopped early is COMPLETE with an estimate.
+# States of a finished trial. PRUNED means impossible parameters.
 FINISHED = (TrialState.COMPLETE, TrialState.PRUNED)
 
 
@@ -145,7 +140,7 @@ class SearchStudy:
         return self.optuna.get_trials(deepcopy=False)
 
     def finished(self) -> list[FrozenTrial]:
-        """Returns Optuna's finished trials, sorted by number: complete, stopped early, or impossible ones."""
+        """Returns Optuna's finished trials, sorted by number: complete or impossible ones."""
         return [t for t in self.trials() if t.state in FINISHED]
 
     def ask(self, take_running: bool = False) -> optuna.Trial | None:
@@ -182,10 +177,7 @@ class SearchStudy:
         return [self._record(t) for t in self.finished()]
 
     def _record(self, t: FrozenTrial) -> TrialRecord:
-        if ERROR in t.user_attrs:
-            return TrialRecord(t.number, (), dict(t.params), 0, error=t.user_attrs[ERROR])
-        episodes = t.user_attrs.get(PRUNED, len(self.plan.training))
-        return TrialRecord(t.number, tuple(t.values or ()), dict(t.params), episodes, PRUNED in t.user_attrs)
+        return TrialRecord(t.number, tuple(t.values or ()), dict(t.params), t.user_attrs.get(ERROR, ""))
 
     def left_out(self) -> list[str]:
         """Returns for each training scene, in order, why it was left out, "" if it was not."""
@@ -239,9 +231,10 @@ def open_study(plan: SearchPlan, storage: str | Path | None, name: str) -> Itera
 def _check_identity(plan: SearchPlan, study: optuna.Study, storage: object) -> None:
     mine, stored = plan.identity(), study.user_attrs.get(SETTINGS, {})
     remedy = "begin anew with --fresh, or choose another --out or --study"
-    if different := [key for key in mine if stored.get(key) != mine[key]]:
+    if different := [key for key in {**mine, **stored} if stored.get(key) != mine.get(key)]:
         key, got = different[0], f"another search: {', '.join(different)} differ"
-        expected, remedy = f"{key} {stored.get(key)}, not {mine[key]}", f"{remedy}, or repeat the command that began it"
+        expected = f"{key} {stored.get(key)}, not {mine.get(key)}"
+        remedy = f"{remedy}, or repeat the command that began it"
     elif changed := changes(study.user_attrs.get(USED, {}), plan.tracker.folder):
         got, expected = f"trials made before {', '.join(changed)} changed", "the tracker as it was"
     else:
@@ -263,8 +256,6 @@ def quiet_optuna() -> Iterator[None]:
 
 
 PAUSE = 0.5  # Seconds between two looks at whether other processes have finished.
-
-LEAST_LOSS = 1e-12  # Least difference between the best value and the estimate of a pruned trial.
 
 
 def run_trials(study: SearchStudy, play: PlayEpisodes, progress: Progress) -> None:
@@ -299,43 +290,21 @@ def _play_trial(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -> 
 
 
 def _trial_values(study: SearchStudy, trial: optuna.Trial, play: PlayEpisodes) -> list[float] | FlockscopeError:
-    plan, played, goal = study.plan, dict[int, Episode](), study.plan.goals[0]
+    plan, played = study.plan, list[Episode]()
     try:
         config = plan.config(trial.params).as_dict()
     except FlockscopeError as error:
         return error
-    # Each trial has an order of its own, so that no few scenes decide about all trials.
-    order = np.random.default_rng([plan.options.seed, trial.number]).permutation(len(plan.training)).tolist()
-    may_stop = trial.number > 0 and len(plan.goals) == 1
-    with closing(play([plan.training[k] for k in order], config, plan.needs_every_score)) as results:
-        for k, result in zip(order, results, strict=True):
+    with closing(play(plan.training, config, plan.needs_every_score)) as results:
+        for result in results:
             if isinstance(result, FlockscopeError):
                 return result
-            played[k] = result
-            estimate = _estimate_if_losing(study, played) if may_stop and len(played) < len(order) else None
-            if estimate is not None:
-                trial.set_user_attr(PRUNED, len(played))
-                return [estimate]
-    trial.set_user_attr(SCENES, [goal.of(played[k]) for k in sorted(played)])
+            played.append(result)
     if trial.number == 0:
-        trial.set_user_attr(LEFT_OUT, [played[k].left_out for k in sorted(played)])
-    values = [goal.mean([played[k] for k in sorted(played)]) for goal in plan.goals]
+        trial.set_user_attr(LEFT_OUT, [episode.left_out for episode in played])
+    values = [goal.mean(played) for goal in plan.goals]
     unknown = [goal.key for goal, value in zip(plan.goals, values, strict=True) if value != value]
     if unknown:
         got, remedy = f"{unknown[0]} unknown in every training scene", "choose another score, suite or tracker"
         return InputError(place="--objective", got=got, expected="scenes that have this score", remedy=remedy)
     return values
-
-
-def _estimate_if_losing(study: SearchStudy, played: dict[int, Episode]) -> float | None:
-    """Returns an estimate of the value of a trial that surely loses to the best one by these scenes, else None."""
-    goal, complete = study.plan.goals[0], [t for t in study.finished() if t.state == TrialState.COMPLETE]
-    if not complete:
-        return None
-    best = study.optuna.best_trial
-    gains = [goal.gain(best.user_attrs[SCENES][k], goal.of(e)) for k, e in played.items()]
-    gains = [gain for gain in gains if gain == gain]
-    if best.value is None or not should_prune(gains, study.plan.options.prune):
-        return None
-    loss = max(-mean_of_known(gains), LEAST_LOSS)
-    return best.value - loss if goal.higher else best.value + loss

@@ -82,7 +82,7 @@ def test_settings_reach_the_scenes(tmp_path):
 
 
 WRONG_OPTIONS = [
-    ({"trials": 0}, "--trials: got 0"), ({"prune": 1.0}, "--prune: got 1.0"), ({"finalists": 0}, "--finalists"),
+    ({"trials": 0}, "--trials: got 0"), ({"finalists": 0}, "--finalists"),
     ({"seed": -1}, "--seed"), ({"only": ["reech"]}, "did you mean reach"),
     ({"only": ["reach"], "set": ["reach=1"]}, "reach; .* not set"), ({"only": ["steps"]}, "have an effect"),
     ({"set": ["reach=99"]}, "from 0.05 to 5"), ({"detections": "image"}, "--detections"),
