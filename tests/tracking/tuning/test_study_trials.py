@@ -74,7 +74,7 @@ def test_a_study_of_a_version_that_knew_more_is_refused(tmp_path):
     made = toy_plan(tmp_path)
     with open_study(made, tmp_path / "j", "x") as study:
         study.optuna.set_user_attr(SETTINGS, {**made.identity(), "prune": 0.1})
-    with pytest.raises(InputError, match="prune 0.1, not None"), open_study(made, tmp_path / "j", "x"):
+    with pytest.raises(InputError, match=r"prune 0\.1, not None"), open_study(made, tmp_path / "j", "x"):
         pass
 
 
