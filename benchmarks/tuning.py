@@ -8,6 +8,7 @@ parameters that `tune` found (similarity by boxes, choice on validation seeds)
 
 standard    on the scenes of tuning_suites/peers.toml
 --like      on the scenes that `fit scene` makes of the recording's detections, without its labels
+both        on these and on the standard ones, about as many of either
 labels      on the scenes that `fit scene --labels` makes of the first third of the recording: people, camera and
             detector; judged on the rest
 labels of…  the same of another recording, the whole of it
@@ -22,7 +23,7 @@ from __future__ import annotations
 import json
 import tempfile
 import warnings
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +55,9 @@ RECORDINGS = {"PETS09": PETS, "TownCentre": TOWN_CENTRE, "TUD-Campus": CAMPUS}
 NAMES = ("SORT", "ByteTrack", "OC-SORT", "norfair")
 KINDS = {name: PEERS[name][1] for name in NAMES} | {"blob": Blob}
 SCORE = "HOTA"
-LABELS, OTHERS = "labels of the first third", "labels of another"
+BOTH, LABELS, OTHERS = "both", "labels of the first third", "labels of another"
+WAYS = "standard", "--like", BOTH, LABELS, OTHERS, "itself"
+DRAWN = 6  # scenes of a recording's kind in training
 SEED, HALF = 0, 0.5  # of draws; share of the parameters that a draw anywhere changes
 Found = dict[str, dict[str, list[float]]]  # by recording and way: the difference and its ends
 
@@ -111,14 +114,17 @@ def _scores(
     return [tuple(CATALOGUE[SCORE].within(x, difference=bool(k)).tolist()) for k, x in enumerate(ends)]
 
 
-def play(name: str, recordings: Mapping[str, Sequence], scenes: Mapping[str, Path], trials: int, found: Found) -> None:
-    """Adds all gains of a tracker that are not yet in `found`, and prints what was changed."""
+def play(
+    name: str, recordings: Mapping[str, Sequence], scenes: Mapping[str, Path], trials: int, found: Found,
+    keep: Callable[[], None],
+) -> None:  # fmt: skip
+    """Adds all gains of a tracker that are not yet in `found`, and prints what was changed. keep: called after each."""
     kind = KINDS[name]
     configs = dict[str, Config]()
 
     def config(way: str) -> Config:
         if way not in configs:
-            configs[way] = tuned(kind, scenes[way], trials, 1 if way == "standard" else 6)
+            configs[way] = tuned(kind, scenes[way], trials, DRAWN if scenes[way].suffixes[0] == ".scene" else 1)
             base, now = kind.config_class().as_dict(), configs[way].as_dict()
             changed = [f"{p}={short(value)}" for p, value in now.items() if value != base[p]]
             print(f"{name}, {way}: {', '.join(changed) or 'nothing changed'}", flush=True)
@@ -128,12 +134,13 @@ def play(name: str, recordings: Mapping[str, Sequence], scenes: Mapping[str, Pat
         row = found.setdefault(place, {})
         if "default" not in row:
             row["default"] = list(_scores(kind, recording, (kind.config_class(),) * 2)[0])
-        ways = {"standard": "standard", "--like": f"like {place}", LABELS: f"third of {place}"}
+        ways = {"standard": "standard", "--like": f"like {place}", BOTH: f"both {place}", LABELS: f"third of {place}"}
         ways |= {f"labels of {other}": f"labels of {other}" for other in recordings if other != place}
         for way, scene in ways.items():
             if way not in row:
                 first = third(recording) if way == LABELS else 0
                 row[way] = list(gain(kind, recording, config(scene), first))
+                keep()
         if "itself" not in row:
             row["itself"] = list(gain(kind, recording, tuned_on_itself(kind, recording, 4 * trials)))
         print(name, place, {way: round(values[0], 3) for way, values in row.items()}, flush=True)
@@ -147,7 +154,7 @@ def third(recording: Sequence) -> int:
 def show(every: Mapping[str, Found]) -> None:
     """Prints the tables, of the ways that all trackers and recordings have."""
     found = [row for each in every.values() for row in each.values()]
-    ways = [way for way in ("standard", "--like", LABELS, OTHERS, "itself") if all(way in known(row) for row in found)]
+    ways = [way for way in WAYS if all(way in known(row) for row in found)]
     gains = {name: {way: [known(row)[way][0] for row in each.values()] for way in ways} for name, each in every.items()}
     rows = {name: [f"{np.mean(each[way]):+.3f}" for way in ways] for name, each in gains.items()}
     others = [name for name in NAMES if name in gains]
@@ -189,17 +196,23 @@ def main() -> None:
         scenes = {"standard": SUITE}
         for name, recording in recordings.items():
             begin = cut(recording, 1, third(recording))
-            for way, seen in (
-                (f"like {name}", recording),
-                (f"labels of {name}", recording),
-                (f"third of {name}", begin),
-            ):
-                scenes[way] = Path(folder) / f"{way.replace(' ', '-')}.toml"
-                scenes[way].write_text(scene_like(seen, labels=not way.startswith("like")).to_toml())
-        for name in trackers:
-            play(name, recordings, scenes, args.trials, every.setdefault(name, {}))
+            for kind, seen in (("like", recording), ("labels of", recording), ("third of", begin)):
+                way = f"{kind} {name}"
+                scenes[way] = Path(folder) / f"{way.replace(' ', '-')}.scene.toml"
+                scenes[way].write_text(scene_like(seen, labels=kind != "like").to_toml())
+            scenes[f"both {name}"] = Path(folder) / f"both-{name}.toml"
+            like = scenes[f"like {name}"].name
+            scenes[f"both {name}"].write_text(f'''about = "scenes with occlusion, and scenes like a recording"
+entry = [{{ suite = "{SUITE}" }}, {{ scenario = "{like}", repeat = {DRAWN} }}]
+''')
+
+        def keep() -> None:
             if args.json:
                 args.json.write_text(json.dumps(every))
+
+        for name in trackers:
+            play(name, recordings, scenes, args.trials, every.setdefault(name, {}), keep)
+            keep()
     show({name: every[name] for name in trackers})
 
 
