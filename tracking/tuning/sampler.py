@@ -9,8 +9,7 @@ early in a search, and neither TPE nor CMA-ES surely more in all of it (`python 
 The parameters of trial n depend only on the seed, on n and on the trials finished before. A search that was killed and
 is resumed therefore finds what it would have found.
 
-All trials are played to their end. Optuna's WilcoxonPruner, and the same test made faster, bought a fifth more trials
-in equal CPU time, and no better parameters.
+All trials are played to their end: a pruner buys more trials in equal CPU time, and no better parameters.
 """
 
 from __future__ import annotations
