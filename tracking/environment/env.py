@@ -236,7 +236,8 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
     def _advance(self, rollout: Rollout, upto: int | None) -> bool:
         assert self._signals is not None
         for frame, tracks in rollout.advance(upto):
-            self._signals.add(frame, tracks)
+            if self.decision_every is not None:  # else nothing is decided by them
+                self._signals.add(frame, tracks)
         done = len(rollout.tracks)
         return done == rollout.length or upto is None or done < upto
 

@@ -131,6 +131,14 @@ def test_the_objective_is_not_known_before_the_end_of_windows():
     assert rewards.tolist() == [info["objective"]]
 
 
+def test_statistics_are_collected_where_something_is_left_to_decide():
+    for every, told in ((None, False), (5, True)):
+        env = make(decision_every=every)
+        env.reset(seed=0)
+        seen = env.step(np.zeros(env.action_space.shape, np.float32))[0]
+        assert seen[: len(NAMES)].any() == told
+
+
 class FarAway(Toy):
     """Is 100 m off if `skip` is not 0."""
 
