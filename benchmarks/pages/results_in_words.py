@@ -107,5 +107,27 @@ def tuning() -> str:
         f" recording without its labels, {signed(others['labels of another'])} with the labels of another one; draws on"
         f" the recording itself find {signed(others['itself'])}. `blob`, whose defaults are tuned already,"
         f" {signed(ours['standard'])}, {signed(ours['--like'])}, {signed(ours['labels of another'])} and"
-        f" {signed(ours['itself'])} {link('docs/results/tuning.md', 'tuning')}."
+        f" {signed(ours['itself'])} {link('docs/results/tuning.md', 'tuning')}.\n\n{_adapting()}"
+    )
+
+
+def _adapting() -> str:
+    """What a policy earns where the detector changes, and where nothing changes."""
+    titles = [table["title"] for table in results.stored(results.tables()["adaptation"])["tables"]]
+    trackers = [title.partition(",")[0] for title in titles if ", standard: " in title]
+    gains = {
+        suite: " and ".join(
+            signed(row["beside the best constant"])
+            for tracker in trackers
+            for row in rows("adaptation", f"{tracker}, {suite}: ")
+            if row["parameters"] == "policy"
+        )
+        for suite in ("drift", "drift-other", "standard")
+    }
+    names = " and ".join(f"`{tracker}`" for tracker in trackers)
+    return (
+        "What parameters earn that a [policy](docs/reference/tuning.md#policies) changes while a camera runs, beside"
+        f" the best constant, {names}: {gains['drift']} where the detector changes, {gains['drift-other']} where it"
+        f" changes in ways not trained on, {gains['standard']} where nothing changes; * is a sure difference"
+        f" {link('docs/results/tuning.md#does-it-pay-to-change-parameters-while-a-camera-runs', 'adaptation')}."
     )
