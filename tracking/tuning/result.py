@@ -28,6 +28,7 @@ from tracking.tuning.search_plan import SearchPlan, seeds_text
 
 BLUE, ORANGE = "#0b6bcb", "#d4600a"
 SHOWN = 1.0  # Of the range from the best value to the worst quarter: what is shown beyond; worse ones are marked.
+ROOM = 0.1  # of the range that is shown, above the best value
 
 
 def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
@@ -49,7 +50,8 @@ def history_plot(plan: SearchPlan, records: Sequence[TrialRecord]) -> str:
         beyond = [t.number for t in trials if goal.gain(edge, t.values[0]) < 0]
         if beyond and bad != best[-1]:
             axes.plot(beyond, [edge] * len(beyond), "|", color=BLUE, label="far worse")
-            axes.set_ylim(**{"bottom" if goal.higher else "top": edge})
+            axes.set_ylim(sorted((edge, best[-1] + ROOM * (best[-1] - edge))))
+    axes.xaxis.get_major_locator().set_params(integer=True)
     axes.set(xlabel="trial", ylabel=f"{goal.key}, training scenes (optimised: no result)")
     axes.legend(fontsize=8)
     return _svg(figure)
