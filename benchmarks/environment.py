@@ -2,7 +2,7 @@
 
     python -m benchmarks environment [TRACKER …] [--episodes 1000] [--seed 0] [--environments DIR]
 
-Three tables:
+Four tables:
 
 - Each tracker and each of its action spaces: Gymnasium's `check_env` with warnings as errors; a pickled copy in the
   middle of an episode goes on to the same bits; synchronous vectors in the three modes of autoreset, asynchronous ones,
@@ -12,6 +12,7 @@ Three tables:
   are finite, those of prefixes sum to the objective, those of windows are `tracking.evaluate` of the window times its
   share (compared in episodes of at most WINDOWS steps).
 - CPU time of a step with a decision in each frame, by fifth of an episode of `street`.
+- CPU time of an episode as a step of the environment, which is how `tune` plays it, beside the same without one.
 """
 
 from __future__ import annotations
@@ -45,9 +46,13 @@ from benchmarks.support.tables import head, row
 from benchmarks.support.timing import machine_load
 from sim.types import Array
 from tracking.environment.env import Actions, TuningEnv
+from tracking.episodes.episode import Episode, sources
 from tracking.episodes.episode_cache import SourceCache
+from tracking.episodes.parallel_episodes import EpisodeTask, play_task
+from tracking.episodes.tuned_tracker import tuned_tracker
 from tracking.parameter_space import decode_and_build
-from tracking.running.tracker_registry import names
+from tracking.running.tracker_registry import find, names
+from tracking.tuning.episode_player import stepped
 
 ID = "tracking:flockscope/Tuning-v0"
 SPACES: tuple[Actions, ...] = "residual", "absolute", "presets"
@@ -56,7 +61,7 @@ EVERY, SEEDS = 8, (1, 2)  # frames between decisions; of two episodes
 SCENES, FIRST = "quick", 30_000  # of random episodes; their first seed
 INTERVALS = None, 1, 3, 10, 50, 10_000
 WINDOWS = 12
-TIMED, STEPS = ["blob", "group-pda", "SORT"], ("street", [0], ["duration=20"])
+TIMED, STEPS, PAIRS = ["blob", "group-pda", "SORT"], ("street", [0], ["duration=20"]), 15
 Make = Callable[[], gymnasium.Env[Any, Any]]
 Played = tuple[list[Array], list[float]]
 
@@ -309,6 +314,32 @@ def time_steps(libraries: Mapping[str, str]) -> None:
         row([f"`{name}`", *(f"{part.mean():.2f}" for part in parts), ends, f"{spent[-1]:.1f}"])
 
 
+def compare_ways(libraries: Mapping[str, str]) -> None:
+    """Prints how much CPU time it takes to play episodes by steps of the environment. Raises AssertionError if scores
+    differ."""
+    suite, seeds, settings = STEPS
+    print(f"\nCPU time of an episode by a step of the environment, of {PAIRS} pairs: {suite}, {', '.join(settings)}")
+    head(["tracker", "episodes, ms", "by steps, ms", "more"])
+    for name in TIMED:
+        if name in PEERS and not libraries.get(PEERS[name][0]):
+            continue
+        tracker = tuned_tracker(find(PEERS[name][1] if name in PEERS else name))
+        (source,) = sources(suite, seeds, settings)
+        task = EpisodeTask(tracker, source, {}, "file", every_score=False)
+        spent: dict[Any, list[float]] = {play_task: [], stepped: []}
+        for k in range(PAIRS + 1):  # in the first pair kernels are compiled
+            scores = []
+            for play, times in spent.items():
+                begun = time.process_time_ns()
+                found = play(task)
+                times += [(time.process_time_ns() - begun) / 1e6] if k else []
+                assert isinstance(found, Episode)
+                scores.append(found.scores)
+            assert scores[0] == scores[1], f"{name}: scores by steps of the environment differ"
+        plain, by_steps = (float(np.median(times)) for times in spent.values())
+        row([f"`{name}`", f"{plain:.0f}", f"{by_steps:.0f}", f"{by_steps / plain - 1:+.1%}"])
+
+
 def main() -> None:
     parser = new_parser(__doc__)
     add_trackers(parser, names())
@@ -322,6 +353,7 @@ def main() -> None:
     check_all(trackers)
     random_episodes(trackers, given.episodes, given.seed)
     time_steps(libraries)
+    compare_ways(libraries)
 
 
 if __name__ == "__main__":
