@@ -190,6 +190,11 @@ def playable(bench: Bench, found: Sequence[Scene]) -> list[Scene]:
     return kept
 
 
+def training_scenes(bench: Bench, seeds: range) -> list[Scene]:
+    """Returns the scenes on which all searches are trained, those that change first."""
+    return [scene for suite in TRAINING for scene in playable(bench, scenes(suite, seeds))]
+
+
 class Search:
     """Plays sets of parameters on all training scenes. State: `means`, the mean objective of each round."""
 
@@ -258,8 +263,8 @@ def adaptation(name: str, configs: int, train: range, seeds: range, picture: Pat
     from optuna.samplers import TPESampler
 
     bench = Bench(name)
-    drifting, *others = (playable(bench, scenes(suite, train)) for suite in TRAINING)
-    training = [*drifting, *(scene for each in others for scene in each)]
+    training = training_scenes(bench, train)
+    drifting = [scene for scene in training if scene.changes]  # the first ones
     size, still = len(bench.space), np.zeros(len(bench.space))
     rounds = rounds_of(configs)
     searches = {key: Search(bench, training) for key in ("random", "TPE", "CMA", "linear by CMA", "policy")}

@@ -31,7 +31,18 @@ import gymnasium
 import numpy as np
 from gymnasium.spaces import Box
 
-from benchmarks.adaptation import LIMIT, SEARCHED, SUITES, TRAINING, Bench, Scene, Search, playable, rounds_of, scenes
+from benchmarks.adaptation import (
+    LIMIT,
+    SEARCHED,
+    SUITES,
+    Bench,
+    Scene,
+    Search,
+    playable,
+    rounds_of,
+    scenes,
+    training_scenes,
+)
 from benchmarks.peers.environments import DEFAULT, make_environments
 from benchmarks.support import chart
 from benchmarks.support.options import add_seeds, add_trackers, new_parser, one_thread, seeds_text
@@ -165,7 +176,7 @@ def learn(name: str, algorithms: Sequence[str], seeds: int, train: range, test: 
     if not missing:
         return
     bench, configs, reward = Bench(name), results.options["configs"], results.options["reward"]
-    training = [scene for suite in TRAINING for scene in playable(bench, scenes(suite, train))]
+    training = training_scenes(bench, train)
     for algorithm, seed in missing:
         begun = time.perf_counter()
         if algorithm == "defaults":

@@ -51,7 +51,7 @@ from tracking.episodes.episode_cache import SourceCache
 from tracking.episodes.parallel_episodes import EpisodeTask, play_task
 from tracking.episodes.tuned_tracker import tuned_tracker
 from tracking.parameter_space import decode_and_build
-from tracking.running.tracker_registry import find, names
+from tracking.running.tracker_registry import names
 from tracking.tuning.episode_player import stepped
 
 ID = "tracking:flockscope/Tuning-v0"
@@ -287,18 +287,20 @@ def drawn_action(env: TuningEnv, way: int, rng: np.random.Generator) -> Any:
     return ways[way].astype(rng.choice([np.float32, np.float64]))
 
 
+def timed(libraries: Mapping[str, str]) -> dict[str, Any]:
+    """Returns by name the trackers of TIMED, without those of libraries that are not installed."""
+    found = {name: PEERS[name] for name in TIMED if name in PEERS}
+    missing = {name for name, (library, _) in found.items() if not libraries.get(library)}
+    return {name: found[name][1] if name in found else name for name in TIMED if name not in missing}
+
+
 def time_steps(libraries: Mapping[str, str]) -> None:
     """Prints the CPU time of a step of some trackers."""
     suite, seeds, settings = STEPS
     print(f"\nCPU time of a step with decision_every=1, ms: {suite}, {', '.join(settings)}; {machine_load()}")
     head(["tracker", *(f"fifth {k}" for k in range(1, 6)), "tracks: first, last fifth", "last step"])
-    for name in TIMED:
-        if name in PEERS and not libraries.get(PEERS[name][0]):
-            continue
-        env = TuningEnv(
-            PEERS[name][1] if name in PEERS else name, suite, seeds=seeds, set=settings, detections="file",
-            decision_every=1,
-        )  # fmt: skip
+    for name, tracker in timed(libraries).items():
+        env = TuningEnv(tracker, suite, seeds=seeds, set=settings, detections="file", decision_every=1)
         zero, spent, tracks = np.zeros(env.action_space.shape, np.float32), list[float](), list[int]()
         for _ in range(2):  # in the first episode kernels are compiled
             env.reset()
@@ -320,12 +322,9 @@ def compare_ways(libraries: Mapping[str, str]) -> None:
     suite, seeds, settings = STEPS
     print(f"\nCPU time of an episode by a step of the environment, of {PAIRS} pairs: {suite}, {', '.join(settings)}")
     head(["tracker", "episodes, ms", "by steps, ms", "more"])
-    for name in TIMED:
-        if name in PEERS and not libraries.get(PEERS[name][0]):
-            continue
-        tracker = tuned_tracker(find(PEERS[name][1] if name in PEERS else name))
-        (source,) = sources(suite, seeds, settings)
-        task = EpisodeTask(tracker, source, {}, "file", every_score=False)
+    (source,) = sources(suite, seeds, settings)
+    for name, tracker in timed(libraries).items():
+        task = EpisodeTask(tuned_tracker(tracker), source, {}, "file", every_score=False)
         spent: dict[Any, list[float]] = {play_task: [], stepped: []}
         for k in range(PAIRS + 1):  # in the first pair kernels are compiled
             scores = []

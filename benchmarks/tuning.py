@@ -62,7 +62,7 @@ SEED, HALF = 0, 0.5  # of draws; share of the parameters that a draw anywhere ch
 Found = dict[str, dict[str, list[float]]]  # by recording and way: the difference and its ends
 
 
-def tuned(kind: Any, scenes: Path, trials: int, seeds: int) -> Config:
+def tuned(kind: Any, scenes: Path, seeds: int, trials: int) -> Config:
     """Returns the parameters that `tune` finds for a tracker; seeds: of training, of each scene."""
     return tune(
         kind, scenes, trials, objective=SCORE, detections="file", similarity="boxes", check=None, finalists=3,
@@ -115,16 +115,17 @@ def _scores(
 
 
 def play(
-    name: str, recordings: Mapping[str, Sequence], scenes: Mapping[str, Path], trials: int, found: Found,
+    name: str, recordings: Mapping[str, Sequence], scenes: Mapping[str, tuple[Path, int]], trials: int, found: Found,
     keep: Callable[[], None],
 ) -> None:  # fmt: skip
-    """Adds all gains of a tracker that are not yet in `found`, and prints what was changed. keep: called after each."""
+    """Adds all gains of a tracker that are not yet in `found`, and prints what was changed. scenes: by way a file, and
+    the training seeds of each scene in it. keep: called after each gain."""
     kind = KINDS[name]
     configs = dict[str, Config]()
 
     def config(way: str) -> Config:
         if way not in configs:
-            configs[way] = tuned(kind, scenes[way], trials, DRAWN if scenes[way].suffixes[0] == ".scene" else 1)
+            configs[way] = tuned(kind, *scenes[way], trials)
             base, now = kind.config_class().as_dict(), configs[way].as_dict()
             changed = [f"{p}={short(value)}" for p, value in now.items() if value != base[p]]
             print(f"{name}, {way}: {', '.join(changed) or 'nothing changed'}", flush=True)
@@ -193,18 +194,18 @@ def main() -> None:
     recordings = {name: open_source(args.data / path, images=False)[0] for name, path in RECORDINGS.items()}
     every: dict[str, Found] = json.loads(args.json.read_text()) if args.json and args.json.exists() else {}
     with tempfile.TemporaryDirectory() as folder:
-        scenes = {"standard": SUITE}
+        scenes = {"standard": (SUITE, 1)}
         for name, recording in recordings.items():
             begin = cut(recording, 1, third(recording))
             for kind, seen in (("like", recording), ("labels of", recording), ("third of", begin)):
                 way = f"{kind} {name}"
-                scenes[way] = Path(folder) / f"{way.replace(' ', '-')}.scene.toml"
-                scenes[way].write_text(scene_like(seen, labels=kind != "like").to_toml())
-            scenes[f"both {name}"] = Path(folder) / f"both-{name}.toml"
-            like = scenes[f"like {name}"].name
-            scenes[f"both {name}"].write_text(f'''about = "scenes with occlusion, and scenes like a recording"
-entry = [{{ suite = "{SUITE}" }}, {{ scenario = "{like}", repeat = {DRAWN} }}]
+                scenes[way] = Path(folder) / f"{way.replace(' ', '-')}.toml", DRAWN
+                scenes[way][0].write_text(scene_like(seen, labels=kind != "like").to_toml())
+            both, (like, _) = Path(folder) / f"both-{name}.toml", scenes[f"like {name}"]
+            both.write_text(f'''about = "scenes with occlusion, and scenes like a recording"
+entry = [{{ suite = "{SUITE}" }}, {{ scenario = "{like.name}", repeat = {DRAWN} }}]
 ''')
+            scenes[f"both {name}"] = both, 1
 
         def keep() -> None:
             if args.json:
