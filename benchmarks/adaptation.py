@@ -13,8 +13,6 @@ defaults           the tracker's own
 random, TPE, CMA   constants drawn round the defaults, by Optuna's TPE and by its CMA-ES; the best in training of all
                    three is the best constant
 TPE, twice         by TPE with the rounds that a policy has beside those of a constant
-hindsight          for each part of each entry of `drift` the constant that was best there in training; it is told when
-                   the parts begin, which no tracker knows: what could be gained
 
 and residuals round the best constant, with rounds of their own:
 
@@ -23,14 +21,15 @@ rule               three lines: the noise of positions follows the residuals, th
 linear by CMA      linear in four statistics, whose weights Optuna's CMA-ES searches
 policy             linear, from a response surface (`tracking.tuning.adaptive`), as `tune --adaptive` finds it
 
-SORT and ByteTrack are those of roboflow `trackers` (benchmarks/peers). --chart: the best training value over the
+What could be gained is told by `benchmarks hindsight`. SORT and ByteTrack are those of roboflow `trackers`
+(benchmarks/peers). --chart: the best training value over the
 searches; --out: what the policy does in the first test episode. Each of the first tracker.
 """
 
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -165,18 +164,6 @@ class Bench:
         """Plays an episode."""
         return play_policy(self.env(scene), policy, offset)
 
-    def told(self, scene: Scene, residuals: Array, chosen: Mapping[tuple[str, int], int]) -> float:
-        """Returns the objective of an episode played by the config that is chosen for each part of the scene."""
-        env, ended, t, scores = self.env(scene), False, 0.0, dict[str, float]()
-        env.reset()
-        columns = [env.space.index(p) for p in self.space]
-        while not ended:
-            action = np.zeros(len(env.space))
-            action[columns] = residuals[chosen[scene.source.name, scene.part(t + EVERY / 2)]]
-            _, _, ended, _, info = env.step(action)
-            t, scores = t + EVERY, info["scores"]
-        return scores["objective"]
-
 
 def playable(bench: Bench, found: Sequence[Scene]) -> list[Scene]:
     """Returns the scenes whose script comes true."""
@@ -264,7 +251,6 @@ def adaptation(name: str, configs: int, train: range, seeds: range, picture: Pat
 
     bench = Bench(name)
     training = training_scenes(bench, train)
-    drifting = [scene for scene in training if scene.changes]  # the first ones
     size, still = len(bench.space), np.zeros(len(bench.space))
     rounds = rounds_of(configs)
     searches = {key: Search(bench, training) for key in ("random", "TPE", "CMA", "linear by CMA", "policy")}
@@ -283,9 +269,6 @@ def adaptation(name: str, configs: int, train: range, seeds: range, picture: Pat
     weighted = linear(bench, base, seen.mean(axis=0), np.maximum(seen.std(axis=0), 0.01))
     dimensions = size * (1 + len(TOLD))
     lines = by_optuna(searches["linear by CMA"], cma(dimensions), rounds, dimensions, weighted)
-    every = [one for pool in pools.values() for one in pool]
-    parts = best_by_part(drifting, [played[: len(drifting)] for _, played in every])
-    residuals = np.array([offset for (_, offset), _ in every])
     rule = Policy(base, EVERY, MEMORY, RULES[name], LIMIT)
     known = {
         "defaults": (bench.still, still), **{key: given for key, (given, _) in best.items()}, "rule": (rule, None),
@@ -304,8 +287,6 @@ def adaptation(name: str, configs: int, train: range, seeds: range, picture: Pat
     for suite in SUITES:
         test = playable(bench, scenes(suite, seeds))
         found = {key: [bench.play(s, *given).objective for s in test] for key, given in known.items()}
-        if suite == "drift":
-            found["hindsight"] = [bench.told(s, residuals, parts) for s in test]
         settled = np.isfinite(list(found.values())).all(axis=0)
         print(f"\n{name}, {suite}: {settled.sum()} scenes", flush=True)
         head(["parameters", "objective", "beside the best constant"])
@@ -329,21 +310,6 @@ def rounds_of(configs: int) -> int:
 def best_of(pool: Sequence[tuple[Given, list[Played]]]) -> tuple[Given, list[Played]]:
     """Returns what has the best mean objective."""
     return max(pool, key=lambda one: mean_objective(one[1]))
-
-
-def best_by_part(training: Sequence[Scene], pool: Sequence[Sequence[Played]]) -> dict[tuple[str, int], int]:
-    """Returns the number of the best config in each part of each entry, by name and part."""
-    found: dict[tuple[str, int], int] = {}
-    for name in dict.fromkeys(scene.source.name for scene in training):
-        mine = [k for k, scene in enumerate(training) if scene.source.name == name]
-        for part in range(3):
-            score = np.zeros(len(pool))
-            for k in mine:
-                times = EVERY * np.arange(len(pool[0][k].score))
-                inside = np.array([training[k].part(t + EVERY / 2) == part for t in times])
-                score += [one[k].score[inside].mean() if inside.any() else 0.0 for one in pool]
-            found[name, part] = int(np.argmax(score))
-    return found
 
 
 def draw(bench: Bench, scene: Scene, policy: Policy, out: Path) -> None:
