@@ -11,6 +11,7 @@ standard    on the scenes of tuning_suites/peers.toml
 both        on these and on the standard ones, about as many of either
 labels      on the scenes that `fit scene --labels` makes of the first third of the recording: people, camera and
             detector; judged on the rest
+checked     the same, where it is no worse than the defaults on the labelled third; else the defaults
 labels of…  the same of another recording, the whole of it
 itself      on the recording itself, by four times as many draws as the search has trials, half of them round the
             defaults, half anywhere; a search may find more
@@ -55,8 +56,8 @@ RECORDINGS = {"PETS09": PETS, "TownCentre": TOWN_CENTRE, "TUD-Campus": CAMPUS}
 NAMES = ("SORT", "ByteTrack", "OC-SORT", "norfair")
 KINDS = {name: PEERS[name][1] for name in NAMES} | {"blob": Blob}
 SCORE = "HOTA"
-BOTH, LABELS, OTHERS = "both", "labels of the first third", "labels of another"
-WAYS = "standard", "--like", BOTH, LABELS, OTHERS, "itself"
+BOTH, LABELS, CHECKED, OTHERS = "both", "labels of the first third", "checked there", "labels of another"
+WAYS = "standard", "--like", BOTH, LABELS, CHECKED, OTHERS, "itself"
 DRAWN = 6  # scenes of a recording's kind in training
 SEED, HALF = 0, 0.5  # of draws; share of the parameters that a draw anywhere changes
 Found = dict[str, dict[str, list[float]]]  # by recording and way: the difference and its ends
@@ -142,9 +143,22 @@ def play(
                 first = third(recording) if way == LABELS else 0
                 row[way] = list(gain(kind, recording, config(scene), first))
                 keep()
+        if CHECKED not in row:
+            row[CHECKED] = row[LABELS] if is_no_worse(kind, recording, config(f"third of {place}")) else [0.0] * 3
+            keep()
         if "itself" not in row:
             row["itself"] = list(gain(kind, recording, tuned_on_itself(kind, recording, 4 * trials)))
         print(name, place, {way: round(values[0], 3) for way, values in row.items()}, flush=True)
+
+
+def is_no_worse(kind: Any, recording: Sequence, config: Config) -> bool:
+    """Returns whether the score of a config is no less than that of the defaults on the first third."""
+    begin = cut(recording, 1, third(recording))
+    before, after = (
+        evaluate(begin.truth, run_of(kind, begin, one), similarity="boxes")[SCORE]
+        for one in (kind.config_class(), config)
+    )
+    return after >= before
 
 
 def third(recording: Sequence) -> int:

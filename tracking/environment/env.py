@@ -23,7 +23,7 @@ import numpy as np
 from gymnasium.spaces import Box, Discrete
 from numpy.typing import NDArray
 
-from scenarios.errors import InputError, OrderError
+from scenarios.errors import InputError, OrderError, WorkError
 from scenarios.limits import is_number
 from scenarios.loading.toml_files import did_you_mean
 from sim.dataset.generate import LEFT_OUT
@@ -34,7 +34,7 @@ from tracking.episodes.episode import AnyTracker, Episode, Rollout, streams_for
 from tracking.episodes.episode_cache import DEFAULT_LIMIT, OpenedSource, SourceCache
 from tracking.episodes.sources import Source, SourceSpec, sources
 from tracking.parameter_space import Space, decode_and_build, encode, moved, space_of
-from tracking.running.detection_mode import choose_mode
+from tracking.running.detection_mode import choose_mode, modes_of
 from tracking.running.policy import require_config
 from tracking.running.prepare import Params, config_of
 from tracking.running.signals import NAMES, Signals
@@ -92,12 +92,16 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
                 detections, or simulated sources have seeds of two splits.
         """
         for place, got, known in (
-            ("detections", detections, (None, *get_args(DetectionMode))), ("actions", actions, get_args(Actions)),
-            ("similarity", similarity, (None, *get_args(Similarity))), ("reward", reward, get_args(Reward)),
+            ("actions", actions, get_args(Actions)), ("reward", reward, get_args(Reward)),
+            ("similarity", similarity, (None, *get_args(Similarity))),
         ):  # fmt: skip
             _check_choice(place, got, known)
         if not is_number(margin, 0.0, 3600.0):
-            raise InputError(place="margin", got=repr(margin), expected="seconds from 0 on", remedy="correct it")
+            raise InputError(place="margin", got=repr(margin), expected="seconds from 0 to 3600", remedy="correct it")
+        if not isinstance(cache, SourceCache):
+            _check_whole("cache", cache, "bytes, 0 or more, or a SourceCache")
+        _check_whole("tracker_seed", tracker_seed, "a whole number, 0 or more")
+        _check_choice("every_score", every_score, (False, True))
         self.played: AnyTracker = tracker
         self.tracker = find(tracker.tracker if isinstance(tracker, TimeLimited) else tracker)
         self.decision_every, self.tracker_seed, self.similarity = decision_every, tracker_seed, similarity
@@ -108,7 +112,8 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
         _check_split(self.sources)
         self.mode = _detection_mode(self.tracker, self.sources, detections)
         self.space: Space = _action_parameters(self.config_class, self.mode, decision_every)
-        self.presets = _presets(self.config_class, actions, presets, self.space, self.defaults)
+        self.presets = _presets(self.config_class, actions, presets)
+        _check_presets(self.presets, self.space, self.defaults)
         self.cache = cache if isinstance(cache, SourceCache) else SourceCache(cache)
         low = np.concatenate([np.zeros(len(NAMES)), np.full(len(self.space), -1.0)]).astype(np.float32)
         self.observation_space = Box(low, np.ones_like(low), dtype=np.float32)
@@ -151,6 +156,7 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
         for name in options:
             _check_choice("options", name, RESET_OPTIONS)
         base = self.defaults if options.get("params") is None else config_of(self.config_class, options["params"])
+        _check_presets(self.presets, self.space, base)
         source, opened = self._open_source(options)
         rollout = None if self.decision_every is None else self._rollout(base, source)
         if rollout is not None:
@@ -177,7 +183,7 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
             InputError: Before `reset`, after the end, for an action of another shape or not finite, or from the
                 tracker.
             IncomparableError: The tracks cannot be compared with the truth.
-            WorkError: The tracker fails.
+            WorkError: The tracker fails. Between two decisions this ends the episode.
         """
         if self._signals is None or self._over:
             got = "no episode" if self._signals is None else "an episode that has ended"
@@ -193,7 +199,11 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
             config = self.config if config == self.config else config  # trackers keep what they derive of it
             first = len(rollout.tracks) + 1
             rollout.prepared.planes.off |= config != self.base
-            terminated = self._advance_with(rollout, config, len(rollout.tracks) + self.decision_every)
+            try:
+                terminated = self._advance_with(rollout, config, len(rollout.tracks) + self.decision_every)
+            except WorkError:
+                self._over = True  # in the middle of a window, with a tracker in no known state
+                raise
         self._over = terminated
         reward = self._rewarded(rollout, first, terminated)
         return self._observe(), reward, terminated, False, self._info()
@@ -325,6 +335,7 @@ def _check_split(among: Iterable[Source]) -> None:
 
 
 def _detection_mode(tracker: type[Tracker], among: tuple[Source, ...], wanted: DetectionMode | None) -> DetectionMode:
+    _check_choice("detections", wanted, (None, *modes_of(tracker.needs)))
     for source in among:
         if not source.simulated:
             wanted = choose_mode(tracker.needs, source.open(("left",)), wanted)
@@ -346,9 +357,7 @@ def _action_parameters(kind: type[Config], mode: DetectionMode, every: int | Non
     return space
 
 
-def _presets(
-    kind: type[Config], actions: Actions, presets: Iterable[Params], space: Space, defaults: Config
-) -> tuple[Config, ...]:
+def _presets(kind: type[Config], actions: Actions, presets: Iterable[Params]) -> tuple[Config, ...]:
     if isinstance(presets, str | Mapping) or not isinstance(presets, Iterable):
         got, expected = repr(presets), "a list of configs, tables or parameter files"
         raise InputError(place="presets", got=got[:80], expected=expected, remedy=f"write [{got[:40]}]")
@@ -356,14 +365,23 @@ def _presets(
     if (actions == "presets") != bool(found):
         got = f"{len(found)} presets with actions={actions!r}"
         raise InputError(place="presets", got=got, expected='some, with actions="presets" alone', remedy="correct it")
+    return found
+
+
+def _check_presets(presets: Iterable[Config], space: Space, base: Config) -> None:
+    """Raises InputError if a preset differs in a parameter that no action changes from what an episode begins with."""
     changeable = {p.name for p in space}
-    for k, one in enumerate(found):
-        fixed = [n for n, v in one.as_dict().items() if n not in changeable and v != getattr(defaults, n)]
+    for k, one in enumerate(presets):
+        fixed = [n for n, v in one.as_dict().items() if n not in changeable and v != getattr(base, n)]
         if fixed:
             place, got = f"presets[{k}]", f"another {fixed[0]}"
             remedy = "leave it as in `params`"
             raise InputError(place=place, got=got, expected="a parameter that may change here", remedy=remedy)
-    return found
+
+
+def _check_whole(place: str, got: object, expected: str) -> None:
+    if isinstance(got, bool) or not isinstance(got, int | np.integer) or got < 0:
+        raise InputError(place=place, got=repr(got), expected=expected, remedy="correct it")
 
 
 def _check_choice(place: str, got: object, known: Iterable[object]) -> None:

@@ -12,6 +12,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from scenarios.errors import InputError
 from sim.types import Motion, Sequence
 
@@ -104,6 +106,10 @@ def sources(
     if isinstance(set, str):
         raise InputError(place="set", got=repr(set), expected='a list of "key=value"', remedy=f"write [{set!r}]")
     numbers, settings = tuple(seeds), tuple(set)
+    for seed in numbers:
+        if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+            got, expected = repr(seed), "whole numbers, 0 or more"
+            raise InputError(place="seeds", got=got, expected=expected, remedy="correct it")
     found = tuple(source for item in what for source in _sources_of(item, numbers, settings))
     if not found:
         raise InputError(place="sources", got="none", expected="at least one", remedy="give a suite, or seeds")

@@ -15,14 +15,16 @@ for each seed.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from scenarios.errors import InputError
+from scenarios.errors import InputError, counted
 from scenarios.loading.toml_files import dump
+from scenarios.schema.groups import FASTEST
 from scenarios.schema.scenario import Scenario
 from scenarios.schema.sensor import Sensor
 from sim.detector.sense import sense
@@ -43,7 +45,7 @@ SEEDS = range(30_000, 30_004)  # of the simulated detections
 TRIES = 2  # of how often ways are walked
 LARGEST = 2.0  # factor by which people may be more than those found
 DURATION, WARMUP = 20.0, 20.0  # s of the scenario, and at most of its time before frame 1
-STANDS = 0.25  # m/s: who is slower stands
+STANDS, SLOWEST, RUNS = 0.25, 0.3, 3.0  # m/s: who is slower stands; least speed of a way; who is faster is doubted
 BEYOND = 1.5  # s for which people walk before and after they were seen
 HALF = 0.5  # truncation of a person who counts as in view
 ASIDE = 0.5  # m by which ways are moved aside, at most
@@ -63,10 +65,12 @@ class Walk:
 
 @dataclass(frozen=True)
 class Likeness:
-    """A recording as a scenario, with the profile of its detector; people: mean number of people in view."""
+    """A recording as a scenario, with the profile of its detector; people: mean number of people in view. measured:
+    whether the recording has detections; else the detector is the default."""
 
     scenario: Scenario
     people: float
+    measured: bool = True
 
     def to_toml(self) -> str:
         """Returns the text of the scenario's file."""
@@ -84,10 +88,11 @@ class Likeness:
     def text(self) -> str:
         """Returns what was found as a line."""
         found = self.as_dict()
+        of = "" if self.measured else " by the default detector, as there are no detections"
         return (
             f"{found['people']} people in view on {found['ways']} ways; camera {found['height']} m high, looks "
             f"{found['tilt_deg']}° down, {found['fps']:g} frames/s; {found['detect_prob']:.0%} of people in full view "
-            f"detected, {found['clutter_rate']:.2f} false alarms per frame"
+            f"detected, {found['clutter_rate']:.2f} false alarms per frame{of}"
         )
 
 
@@ -122,7 +127,7 @@ def scene_like(recording: Recording, *, labels: bool = False) -> Likeness:
     for _ in range(TRIES):
         factor *= wanted / max(_in_view(scenario), 0.1)
         scenario = place.scenario(sensor, factor)
-    return Likeness(scenario, wanted)
+    return Likeness(scenario, wanted, recording.has_detections)
 
 
 def _checked(recording: Recording, labels: bool) -> Recording:
@@ -242,7 +247,7 @@ class Way:
         start, goal = (np.clip(end, MARGIN / 2, high - low - MARGIN / 2) for end in (start, goal))
         return {
             "id": name, "size": self.count, "start": _near(start), "via": [_near(middle)], "goal": _near(goal),
-            "speed": round(min(max(self.speed, 0.3), 3.0), 2), "at_goal": "leave", "repeat": count,
+            "speed": round(min(max(self.speed, SLOWEST), FASTEST), 2), "at_goal": "leave", "repeat": count,
             "enter": {"uniform": [-min(round(self.seconds, 1), warmup), DURATION - 1.0]},
         }  # fmt: skip
 
@@ -298,6 +303,10 @@ def _place(walks: Sequence[Walk], recording: Recording, size: tuple[int, int]) -
             file=recording.name, got="boxes that stand on no ground", expected="boxes of people who stand and walk",
             remedy="check that boxes hold whole people; a camera straight above shows no ground",
         )  # fmt: skip
+    fast = [way.speed for way in ways if way.speed > RUNS]
+    if fast:
+        words = f"{recording.name}: {len(fast)} of {counted(len(ways), 'way')} at {np.median(fast):.1f} m/s"
+        warnings.warn(f"{words}: are {recording.fps:g} frames/s right? (--fps says otherwise)", stacklevel=4)
     return Place(ways, fit.camera, recording.fps, (recording.length or 0) / recording.fps)
 
 

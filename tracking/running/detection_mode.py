@@ -24,6 +24,9 @@ from sim.types import DetectionMode, Detections, Frame, Ints, Sequence
 from tracking.running.tracks_check import finite
 
 BOTH = "pixels and boxes"
+INPUTS: dict[DetectionMode, set[str]] = {
+    "image": {"pixels", "stereo"}, "file": {"boxes", "points"}, "truth": {"boxes", "points"}, "both": {BOTH},
+}  # fmt: skip
 InputKind = Literal["points", "boxes", "pixels", "stereo", "pixels and boxes"]
 
 
@@ -33,9 +36,9 @@ def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: Detection
     A mode is possible if the sequence has what a tracker with these needs takes in it. Raises InputError if the
     requested mode, or for None every mode, is impossible.
     """
-    able = [mode for mode in ("image", "file", "truth", "both") if _works(mode, needs, sequence)]
+    able = [mode for mode in modes_of(needs) if _works(mode, needs, sequence)]
     if requested in able or (requested is None and able):
-        return requested or able[0]  # type: ignore[return-value]
+        return requested or able[0]
     there = {
         "images": sequence.has_images, "a right image": sequence.has_right, "detections": sequence.has_detections,
         "truth": sequence.load_truth is not None,
@@ -48,13 +51,17 @@ def choose_mode(needs: tuple[str, ...], sequence: Sequence, requested: Detection
     raise InputError(place=place, got=got, expected="what both have", remedy=remedy)
 
 
-def _works(mode: str, needs: tuple[str, ...], sequence: Sequence) -> bool:
+def modes_of(needs: tuple[str, ...]) -> tuple[DetectionMode, ...]:
+    """Returns the modes in which a tracker with these needs works if a sequence has what they take."""
+    return tuple(mode for mode, inputs in INPUTS.items() if not inputs.isdisjoint(needs))
+
+
+def _works(mode: DetectionMode, needs: tuple[str, ...], sequence: Sequence) -> bool:
     if mode == "image":
         return ("pixels" in needs and sequence.has_images) or ("stereo" in needs and sequence.has_right)
     if mode == "both":
-        return BOTH in needs and sequence.has_images and sequence.has_detections
-    takes = {"boxes", "points"} & set(needs)
-    return bool(takes) and (sequence.has_detections if mode == "file" else sequence.load_truth is not None)
+        return sequence.has_images and sequence.has_detections
+    return sequence.has_detections if mode == "file" else sequence.load_truth is not None
 
 
 def input_kind(needs: tuple[str, ...], mode: DetectionMode, sequence: Sequence, frames: Iterable[Frame]) -> InputKind:

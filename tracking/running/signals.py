@@ -37,7 +37,7 @@ class Statistic:
 
 
 STATISTICS = (
-    Statistic("time", 20.0, "s", "time since the first frame"),
+    Statistic("time", 20.0, "s", "frames so far, over their rate"),
     Statistic("since", 2.0, "s", "time since the last decision"),
     Statistic("rate", 10.0, "frames/s", "frames per second"),
     Statistic("observed", None, "share", "frames with a detection; from pixels, frames with a picture"),
@@ -49,12 +49,12 @@ STATISTICS = (
     Statistic("associated", None, "share", "detections that belong to a track"),
     Statistic("extra", 1.0, "", "detections of a frame that belong to no track, mean over frames that have some"),
     Statistic("found", None, "share", "tracks that have a detection, in frames that have some"),
-    Statistic("coasting", None, "share", "tracks that the tracker says it only predicted"),
+    Statistic("coasting", None, "share", "tracks that the tracker says it only predicted, mean over frames"),
     Statistic("gap", 0.5, "s", "time since the last detection of a track, mean"),
     Statistic("residual", 0.1, "m or heights", "distance of a detection from its track's prediction, root mean square"),
-    Statistic("nis", 1.0, "", "normalised innovation squared, median"),
+    Statistic("nis", 1.0, "", "normalised innovation squared, median; without the tracker's covariances it is unknown"),
     Statistic("shift", 0.1, "m or heights", "movement common to all tracks beside the prediction, root mean square"),
-    Statistic("births", 1.0, "per s", "new tracks"),
+    Statistic("births", 1.0, "per s", "new tracks, but for those of frame 1"),
     Statistic("deaths", 1.0, "per s", "tracks that ended"),
     Statistic("brief", None, "share", "ended tracks that were younger than 1 s"),
     Statistic("speed", 1.3, "m/s", "speed of the tracks, median"),
@@ -184,6 +184,7 @@ def _comparable(found: Detections, last: Tracks, dt: float) -> tuple[Array, Arra
     half = last.cov.shape[1] // 2
     var = last.cov[:, [0, 1], [0, 1]] + 2 * dt * last.cov[:, [0, 1], [half, half + 1]]
     var = var + dt * dt * last.cov[:, [half, half + 1], [half, half + 1]]
+    var[(last.cov == np.eye(2 * half)).all(axis=(1, 2))] = np.nan  # the identity: not told
     if found.plane == last.plane:
         if last.plane == "image":
             tall = _height(last)

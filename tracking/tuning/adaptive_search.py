@@ -22,6 +22,7 @@ from tracking.episodes.tuned_tracker import TunedTracker
 from tracking.parameter_space import Space
 from tracking.running.policy import Policy
 from tracking.scoring.people import Similarity
+from tracking.stats import FEWEST
 from tracking.tuning.adaptive import Played, play_policy, searched_policy
 from tracking.tuning.candidates import Comparison, HeldOutEvaluator, compare_episodes
 from tracking.tuning.search_plan import SearchPlan
@@ -75,8 +76,11 @@ def online_space(plan: SearchPlan) -> Space:
     search is not for the objective."""
     found = tuple(p for p in plan.space if p.online)
     if [goal.key for goal in plan.goals] != ["objective"]:
-        remedy = "remove --objective, or --adaptive"
-        raise InputError(place="--adaptive", got=plan.goals[0].key, expected="objective", remedy=remedy)
+        got, remedy = (
+            f"a search for {', '.join(goal.key for goal in plan.goals)}",
+            "search for it, or remove --adaptive",
+        )
+        raise InputError(place="--adaptive", got=got, expected="one for objective alone", remedy=remedy)
     if not found:
         got, remedy = "none", "search others, or remove --adaptive"
         expected = "parameters that may change between frames"
@@ -123,6 +127,8 @@ def adapted(
             comparisons += [] if found is None else [found]
             if name == "validation" and (found is None or found.verdict != "better"):
                 words = "" if found is None else f": {found.difference_words}, {counted(found.sequences, 'sequence')}"
+                if found is not None and found.indicative:
+                    words += f", fewer than {FEWEST}; give more --validation seeds"
                 return Adapted(None, tuple(comparisons), f"the constant stays: no policy is surely better{words}")
     return Adapted(best, tuple(comparisons), "the policy is kept: surely better than the constant in validation")
 

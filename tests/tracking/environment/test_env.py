@@ -228,6 +228,34 @@ def test_presets_are_chosen_by_their_number():
             env.step(action)
 
 
+def test_a_preset_that_no_action_may_choose_in_an_episode_is_named_by_reset():
+    env = make(decision_every=5, actions="presets", presets=[{}, {"coast_time": 0.7}]).unwrapped
+    with pytest.raises(InputError, match=r"presets\[0\]: got another management; .*leave it as in `params`"):
+        env.reset(seed=0, options={"params": {"management": "rho"}})
+    env.reset(seed=0, options={"params": {"coast_time": 3.0}})
+    assert env.step(0)[4]["params"]["coast_time"] == env.defaults.coast_time
+
+
+class Falls(Toy):
+    """Fails in frame 6."""
+
+    def step(self, frame, detections):
+        if frame.index == 6:
+            raise ValueError("a mistake")
+        return super().step(frame, detections)
+
+
+def test_a_tracker_that_fails_between_decisions_ends_the_episode():
+    env = make(Falls, "cross", decision_every=4).unwrapped
+    env.reset(seed=0)
+    still = np.zeros(env.action_space.shape, np.float32)
+    env.step(still)
+    with pytest.raises(WorkError, match="a mistake"):
+        env.step(still)
+    with pytest.raises(InputError, match="got an episode that has ended"):
+        env.step(still)
+
+
 def test_after_the_end_a_new_episode_has_to_begin():
     for every in (None, 8):
         env = make(decision_every=every).unwrapped
@@ -331,13 +359,19 @@ WRONG_ARGUMENTS = [
     ("blob", {"decision_every": 0}, "1 or more"), ("blob", {"decision_every": 2.5}, "1 or more"),
     ("blob", {"params": {"gaet": 0.5}}, "did you mean gate"),
     ("blob", {"suite": "nothing at all"}, "a scenario, a suite"),
-    ("blob", {"detections": "boxes"}, "one of None, image, truth, file"),
+    ("blob", {"detections": "boxes"}, "one of None, image, file, truth"),
+    (TOY, {"detections": "image"}, "one of None, file, truth; "),
+    (TOY, {"detections": "both"}, "one of None, file, truth; "),
+    ("blob", {"cache": "big"}, "cache: got 'big'; expected bytes"), ("blob", {"cache": -1}, "cache: got -1"),
+    ("blob", {"every_score": "yes"}, "every_score: got 'yes'"),
+    ("blob", {"tracker_seed": 1.5}, "tracker_seed: got 1.5"),
+    ("blob", {"tracker_seed": -1}, "tracker_seed: got -1"), ("blob", {"seeds": [0.5]}, "seeds: got 0.5"),
     ("blob", {"seeds": [0, 20_000]}, "seeds of one split"),
     ("blob", {"set": "camera.fps=5"}, r"write \['camera.fps=5'\]"),
     (StillToy, {"decision_every": 5}, "may change between frames"),
     ("blob", {"actions": "residuals"}, "did you mean residual"),
     ("blob", {"reward": "windows"}, "did you mean window"),
-    ("blob", {"margin": -1}, "margin: got -1; expected seconds from 0 on"),
+    ("blob", {"margin": -1}, "margin: got -1; expected seconds from 0 to 3600"),
     ("blob", {"margin": float("nan")}, "margin: got nan"),
     ("blob", {"actions": "presets"}, "0 presets with actions='presets'"),
     ("blob", {"presets": [{}]}, "1 presets with actions='residual'"),

@@ -63,6 +63,19 @@ def test_a_crowd_twice_as_dense_gives_about_twice_the_people() -> None:
     assert 1.5 < many / few < 3.5
 
 
+def test_a_wrong_frame_rate_is_doubted(street: Sequence) -> None:
+    with pytest.warns(UserWarning, match=r"ways? at \d\.\d m/s: are 25 frames/s right\? \(--fps says otherwise\)"):
+        found = scene_like(replace(street, fps=25.0))
+    assert max(group.speed for group in found.scenario.group) > 4.0
+
+
+def test_labels_without_detections_do_not_measure_the_detector(street: Sequence) -> None:
+    frames = [replace(frame, detections=None) for frame in street.without_pictures()]
+    bare = replace(street, has_detections=False, frames=lambda: iter(frames), bare=None)
+    found = scene_like(bare, labels=True)
+    assert found.text() == replace(found, measured=True).text() + " by the default detector, as there are no detections"
+
+
 def test_its_text_is_a_scenario_file(street: Sequence, tmp_path) -> None:
     found = scene_like(street)
     (tmp_path / "like.toml").write_text(found.to_toml())

@@ -72,6 +72,17 @@ def test_two_people_who_are_predicted_well() -> None:
     )  # fmt: skip
 
 
+def test_covariances_that_a_tracker_does_not_tell_give_no_nis() -> None:
+    for told in (False, True):
+        signals = Signals(FPS)
+        for k in range(1, 4):
+            one, off = frame(k, np.array(walk(k)) + 0.2), {"cov": np.tile(0.5 * np.eye(4), (2, 1, 1))} if told else {}
+            signals.add(one, Tracks.of_points(one, [1, 2], walk(k), **off))
+        seen = values(signals)
+        assert seen["residual"] > 0.1
+        assert (seen["nis"] > 0) == told
+
+
 def test_frames_are_forgotten_after_a_decision_but_not_the_tracks() -> None:
     signals = Signals(FPS)
     for k in range(1, 6):

@@ -84,7 +84,11 @@ def test_configs_with_which_the_tracker_fails_are_left_out(tmp_path: Path, monke
 
 
 def test_what_cannot_be_adapted_is_said_before_anything_is_played(tmp_path: Path) -> None:
-    for more, words in (({"objective": "HOTA"}, "objective"), ({"objective": (), "adaptive": 3}, "6")):
+    for more, words in (
+        ({"objective": "HOTA"}, "got a search for HOTA; expected one for objective alone"),
+        ({"objective": ("objective", "HOTA")}, "got a search for objective, HOTA"),
+        ({"objective": (), "adaptive": 3}, "6"),
+    ):
         with pytest.raises(InputError, match=words):
             tune(**tune_arguments(tmp_path, **{"adaptive": 6, **more}))
 
