@@ -35,15 +35,10 @@ from tracking.tuning.adaptive import EVERY, Played, drawn_residuals
 SUITE = "drift"
 
 
-def parts_of(scene: Scene, windows: int) -> Array:
-    """Returns in which part of a scene each of its windows lies (W,)."""
-    return np.array([scene.part(EVERY * (k + 0.5)) for k in range(windows)])
-
-
 def best_of_parts(scene: Scene, played: Sequence[Played]) -> Array:
     """Returns the number of the constant that is best in each part (changes + 1,)."""
     score = np.array([one.score for one in played])  # (constants, windows)
-    part = parts_of(scene, score.shape[1])
+    part = np.array([scene.part(EVERY * (k + 0.5)) for k in range(score.shape[1])])
     sums = np.array([score[:, part == k].sum(axis=1) for k in range(len(scene.changes) + 1)])
     return sums.argmax(axis=1)
 
@@ -67,12 +62,12 @@ def hindsight(name: str, constants: int, seeds: range) -> None:
     test = playable(bench, scenes(SUITE, seeds))
     drawn = drawn_residuals(bench.space, constants, np.random.default_rng(SEED))  # the first is 0
     played = [[bench.play(scene, bench.still, each) for each in drawn] for scene in test]
-    objective = np.array([[one.objective for one in row] for row in played])  # (scenes, constants)
+    objective = np.array([[one.objective for one in each] for each in played])  # (scenes, constants)
     found = {
         "defaults": objective[:, 0], "best constant": objective[:, objective.mean(axis=0).argmax()],
         "of each scene": objective.max(axis=1),
         "of each part": np.array(
-            [told(bench, scene, drawn[best_of_parts(scene, row)]) for scene, row in zip(test, played, strict=True)]
+            [told(bench, scene, drawn[best_of_parts(scene, each)]) for scene, each in zip(test, played, strict=True)]
         ),
     }  # fmt: skip
     print(f"\n{name}, {SUITE}: {len(test)} scenes, {constants} constants")
