@@ -144,7 +144,8 @@ def play(
                 row[way] = list(gain(kind, recording, config(scene), first))
                 keep()
         if CHECKED not in row:
-            row[CHECKED] = row[LABELS] if is_no_worse(kind, recording, config(f"third of {place}")) else [0.0] * 3
+            kept = is_no_worse(kind, recording, config(f"third of {place}"))
+            row[CHECKED] = row[LABELS] if kept else [0.0, np.nan, np.nan]
             keep()
         if "itself" not in row:
             row["itself"] = list(gain(kind, recording, tuned_on_itself(kind, recording, 4 * trials)))
