@@ -100,14 +100,13 @@ def tuning() -> str:
     """What tuning earns, and where it earns nothing."""
     found = {row["tracker"]: row for row in rows("tuning", "HOTA minus")}
     others, ours = found["mean of the libraries"], found["blob"]
-    ways = "standard", "--like", "labels of the first third", "checked there", "labels of another", "itself"
+    ways = "standard", "--like", "checked there", "labels of another", "itself"
     gains, own = ([signed(one[way]) for way in ways] for one in (others, ours))
     return (
         f"What it earns on {len(RECORDINGS)} recordings, mean HOTA: {len(found) - 3} trackers of other libraries"
         f" {gains[0]} if tuned on standard scenes, {gains[1]} on scenes like the recording without its labels,"
-        f" {gains[2]} with the labels of its first third, judged on the rest, {gains[3]} if the defaults stay where"
-        f" that is worse on this third, {gains[4]} with the labels of another one; draws on the recording itself find"
-        f" {gains[5]}. `blob`, whose defaults are tuned already,"
+        f" {gains[2]} with the labels of its first third, where that is no worse there, {gains[3]} with the labels of"
+        f" another one; draws on the recording itself find {gains[4]}. `blob`, whose defaults are tuned already,"
         f" {', '.join(own[:-1])} and {own[-1]} {link('docs/results/tuning.md', 'tuning')}.\n\n{_adapting()}"
     )
 
