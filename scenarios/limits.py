@@ -7,7 +7,7 @@ number is refused before it fills memory.
 from __future__ import annotations
 
 import math
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any, TypeGuard
 
 TEXT_BYTES = 128 * 2**20  # bytes of a text file of rows
@@ -38,6 +38,11 @@ def is_number(value: object, low: float = -math.inf, high: float = math.inf) -> 
     """Returns True for a finite real number of Python or numpy from `low` to `high`, but False for a bool."""
     number: Any = value
     return isinstance(value, Real) and not isinstance(value, bool) and low <= number <= high and abs(number) < math.inf
+
+
+def is_whole(value: object, low: float = -math.inf, high: float = math.inf) -> TypeGuard[int]:
+    """Returns True for a whole number of Python or numpy from `low` to `high`, but False for a bool."""
+    return isinstance(value, Integral) and is_number(value, low, high)
 
 
 def fits_picture(width: float, height: float) -> bool:

@@ -24,7 +24,7 @@ from gymnasium.spaces import Box, Discrete
 from numpy.typing import NDArray
 
 from scenarios.errors import InputError, OrderError, WorkError
-from scenarios.limits import is_number
+from scenarios.limits import is_number, is_whole
 from scenarios.loading.toml_files import did_you_mean
 from sim.dataset.generate import LEFT_OUT
 from sim.dataset.splits import split_of
@@ -346,7 +346,7 @@ def _detection_mode(tracker: type[Tracker], among: tuple[Source, ...], wanted: D
 
 
 def _action_parameters(kind: type[Config], mode: DetectionMode, every: int | None) -> Space:
-    if every is not None and (not isinstance(every, int | np.integer) or isinstance(every, bool) or every < 1):
+    if every is not None and not is_whole(every, 1):
         got, expected = repr(every), "a number of frames, 1 or more, or None"
         raise InputError(place="decision_every", got=got, expected=expected, remedy="correct it")
     space = space_of(kind, mode, online=every is not None)
@@ -380,7 +380,7 @@ def _check_presets(presets: Iterable[Config], space: Space, base: Config) -> Non
 
 
 def _check_whole(place: str, got: object, expected: str) -> None:
-    if isinstance(got, bool) or not isinstance(got, int | np.integer) or got < 0:
+    if not is_whole(got, 0):
         raise InputError(place=place, got=repr(got), expected=expected, remedy="correct it")
 
 

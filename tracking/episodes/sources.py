@@ -12,9 +12,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from scenarios.errors import InputError
+from scenarios.limits import is_whole
 from sim.types import Motion, Sequence
 
 if TYPE_CHECKING:
@@ -107,7 +106,7 @@ def sources(
         raise InputError(place="set", got=repr(set), expected='a list of "key=value"', remedy=f"write [{set!r}]")
     numbers, settings = tuple(seeds), tuple(set)
     for seed in numbers:
-        if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
+        if not is_whole(seed, 0):
             got, expected = repr(seed), "whole numbers, 0 or more"
             raise InputError(place="seeds", got=got, expected=expected, remedy="correct it")
     found = tuple(source for item in what for source in _sources_of(item, numbers, settings))

@@ -15,10 +15,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from scenarios.errors import FlockscopeError, InputError, WorkError
-from scenarios.limits import INTEGER, JSON_BYTES
+from scenarios.limits import INTEGER, JSON_BYTES, is_whole
 from scenarios.reading import parse_json
 from sim.pictures.background_sample import untracked_frames
 from sim.types import Context, DetectionMode, Detections, Frame, Ints, Sequence, Tracker, Tracks
@@ -204,7 +202,7 @@ def prepare(
     if not isinstance(sequence, Sequence):
         remedy = "open it: tracking.recordings.source.open_source(path), or sim.simulate(scenario, seed)"
         raise InputError(place="sequence", got=type(sequence).__name__, expected="a Sequence", remedy=remedy)
-    if not isinstance(seed, int | np.integer) or isinstance(seed, bool) or not 0 <= seed <= INTEGER:
+    if not is_whole(seed, 0, INTEGER):
         expected, remedy = f"a whole number from 0 to {INTEGER}", "give a smaller one, such as 0"
         raise InputError(place="--seed", got=repr(seed), expected=expected, remedy=remedy)
     params = resolved_params(tracker, params)

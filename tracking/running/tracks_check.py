@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from scenarios.errors import WorkError
-from scenarios.limits import COORDINATE, FRAMES, INTEGER
+from scenarios.limits import COORDINATE, FRAMES, INTEGER, is_whole
 from sim.types import EVENT_KINDS, GroupEvent, Groups, Tracks
 
 Fault = tuple[str, str]  # What the tracker returned, and what was expected instead.
@@ -174,7 +174,7 @@ def _group_faults(groups: Any, d: int, people: Iterable[int]) -> Iterator[Any]:
 
 
 def _member_fault(members: Iterable[Any], people: Iterable[int], name: str) -> Fault | None:
-    strange = [m for m in members if not (_whole(m) and m in people)]
+    strange = [m for m in members if not (is_whole(m) and m in people)]
     return (f"{strange[0]!r} in {name}", "ids that the tracker has reported") if strange else None
 
 
@@ -182,12 +182,12 @@ def _event_faults(event: GroupEvent, index: int, people: Iterable[int]) -> Itera
     kind, start = event.kind, event.start
     yield kind not in EVENT_KINDS and (f"an event of kind {kind!r}", "one of " + ", ".join(EVENT_KINDS))
     checks = {
-        "start": (_whole(start) and 1 <= start <= index, f"a whole number from 1 to {index}"),
+        "start": (is_whole(start) and 1 <= start <= index, f"a whole number from 1 to {index}"),
         "end": (
-            _whole(event.end) and _whole(start) and start <= event.end <= FRAMES,
+            is_whole(event.end) and is_whole(start) and start <= event.end <= FRAMES,
             f"a whole number from {start} to {FRAMES}",
         ),
-        "emitted": (_whole(event.emitted) and event.emitted == index, f"{index}, the present frame, or None"),
+        "emitted": (is_whole(event.emitted) and event.emitted == index, f"{index}, the present frame, or None"),
         "before": (_are_groups(event.before), "a tuple of group ids, -1 for a person alone"),
         "after": (_are_groups(event.after), "a tuple of group ids, -1 for a person alone"),
         "members": (isinstance(event.members, tuple), "a tuple of ids"),
@@ -199,13 +199,9 @@ def _event_faults(event: GroupEvent, index: int, people: Iterable[int]) -> Itera
 
 
 def _are_groups(ids: Any) -> bool:
-    return isinstance(ids, tuple) and all(_whole(g) and -1 <= g <= INTEGER for g in ids)
+    return isinstance(ids, tuple) and all(is_whole(g) and -1 <= g <= INTEGER for g in ids)
 
 
 def _coordinate(value: Any) -> bool:
     number = isinstance(value, float | int | np.floating | np.integer) and not isinstance(value, bool)
     return number and not abs(value) > COORDINATE
-
-
-def _whole(value: Any) -> bool:
-    return isinstance(value, int | np.integer) and not isinstance(value, bool)

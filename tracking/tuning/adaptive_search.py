@@ -76,10 +76,8 @@ def online_space(plan: SearchPlan) -> Space:
     search is not for the objective."""
     found = tuple(p for p in plan.space if p.online)
     if [goal.key for goal in plan.goals] != ["objective"]:
-        got, remedy = (
-            f"a search for {', '.join(goal.key for goal in plan.goals)}",
-            "search for it, or remove --adaptive",
-        )
+        got = f"a search for {', '.join(goal.key for goal in plan.goals)}"
+        remedy = "search for it, or remove --adaptive"
         raise InputError(place="--adaptive", got=got, expected="one for objective alone", remedy=remedy)
     if not found:
         got, remedy = "none", "search others, or remove --adaptive"
