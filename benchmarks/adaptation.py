@@ -47,7 +47,7 @@ from scenarios.schema.values import Model
 from sim.draws import drawn
 from sim.types import Array
 from tracking.config import Config
-from tracking.environment.env import Reward, TuningEnv
+from tracking.environment.env import Floats, Reward, TuningEnv
 from tracking.episodes.episode_cache import SourceCache
 from tracking.episodes.sources import Source, sources
 from tracking.parameter_space import decode, moved, space_of
@@ -144,7 +144,9 @@ class Bench:
     def __init__(self, name: str) -> None:
         self.tracker, self.cache = find(PEERS[name][1] if name in PEERS else name), SourceCache(SCENES)
         kind = config_class(self.tracker, name)
-        self.space = tuple(p for p in space_of(kind, "file", online=True) if p.name in SEARCHED[name])
+        known = space_of(kind, "file", online=True)
+        self.searched = np.array([p.name in SEARCHED[name] for p in known])  # of the parameters of an action
+        self.space = tuple(p for p in known if p.name in SEARCHED[name])
         self.base = kind()
         self.still = self.constant(self.base)
 
@@ -163,6 +165,22 @@ class Bench:
     def play(self, scene: Scene, policy: Policy, offset: Array | None = None) -> Played:
         """Plays an episode."""
         return play_policy(self.env(scene), policy, offset)
+
+    def action(self, residuals: Array) -> Array:
+        """Returns the action of an environment for the residuals (P,) of the searched parameters."""
+        found = np.zeros(len(self.searched))
+        found[self.searched] = residuals
+        return found
+
+    def objective(self, scene: Scene, act: Callable[[int, Floats], Array]) -> float:
+        """Returns the objective of an episode. act: returns residuals (P,) for the number of a decision, from 0, and
+        what is observed then."""
+        env, ended, k, info = self.env(scene), False, 0, dict[str, Any]()
+        seen, _ = env.reset()
+        while not ended:
+            seen, _, ended, _, info = env.step(self.action(act(k, seen)))
+            k += 1
+        return float(info["scores"].get("objective", np.nan))
 
 
 def playable(bench: Bench, found: Sequence[Scene]) -> list[Scene]:

@@ -49,7 +49,7 @@ from benchmarks.support.options import add_seeds, add_trackers, new_parser, one_
 from benchmarks.support.tables import difference_cell, head, mean_cell, row
 from scenarios.errors import InputError
 from sim.types import Array
-from tracking.environment.env import Floats, Reward, TuningEnv
+from tracking.environment.env import Floats, Reward
 from tracking.running.policy import Policy
 from tracking.tuning.adaptive import EVERY, searched_policy
 
@@ -78,9 +78,8 @@ class Training(gymnasium.Env[Floats, Any]):
     def __init__(self, bench: Bench, among: Sequence[Scene], reward: Reward) -> None:
         self.bench, self.among, self.reward = bench, among, reward
         self.env = bench.env(among[0], reward)
-        self.columns = [self.env.space.index(p) for p in bench.space]
         self.waiting, self.objectives = list[int](), list[float]()
-        self.observation_space, self.action_space = self.env.observation_space, Box(-1.0, 1.0, (len(self.columns),))
+        self.observation_space, self.action_space = self.env.observation_space, Box(-1.0, 1.0, (len(bench.space),))
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
         """Begins an episode on the next scene."""
@@ -91,7 +90,7 @@ class Training(gymnasium.Env[Floats, Any]):
 
     def step(self, action: Any) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Sets the parameters until the next decision."""
-        seen, reward, ended, cut, info = self.env.step(residual(self.env, self.columns, action))
+        seen, reward, ended, cut, info = self.env.step(self.bench.action(residuals_of(action)))
         if ended:
             self.objectives.append(info["scores"].get("objective", float("nan")))
         assert self.env.rollout is not None
@@ -99,21 +98,9 @@ class Training(gymnasium.Env[Floats, Any]):
         return seen, reward * self.env.rollout.length / self.env.decision_every, ended, cut, info
 
 
-def residual(env: TuningEnv, columns: Sequence[int], action: Any) -> Array:
-    """Returns the action of an environment for an agent's action (P,), one number for each of the columns."""
-    found = np.zeros(len(env.space))
-    found[columns] = LIMIT * np.clip(np.asarray(action, float), -1.0, 1.0)
-    return found
-
-
-def objective_of(bench: Bench, scene: Scene, act: Callable[[Floats], Any]) -> float:
-    """Returns the objective of an episode in which `act` gives the agent's action for each observation."""
-    env, ended, info = bench.env(scene), False, dict[str, Any]()
-    seen, _ = env.reset()
-    columns = [env.space.index(p) for p in bench.space]
-    while not ended:
-        seen, _, ended, _, info = env.step(residual(env, columns, act(seen)))
-    return float(info["scores"].get("objective", float("nan")))
+def residuals_of(action: Any) -> Array:
+    """Returns the residuals (P,) for an agent's action (P,)."""
+    return LIMIT * np.clip(np.asarray(action, float), -1.0, 1.0)
 
 
 def learned_by_agent(
@@ -128,7 +115,11 @@ def learned_by_agent(
     agent = kind("MlpPolicy", env, gamma=GAMMA[reward], seed=seed, device="cpu", **SETTINGS[algorithm])
     agent.learn(UNLIMITED, callback=StopTrainingOnMaxEpisodes(rounds * len(training)))
     curve = np.nanmean(np.reshape(env.objectives[: rounds * len(training)], (rounds, -1)), axis=1)
-    return curve, lambda scene: objective_of(bench, scene, lambda seen: agent.predict(seen, deterministic=True)[0])
+
+    def act(_: int, seen: Floats) -> Array:
+        return residuals_of(agent.predict(seen, deterministic=True)[0])
+
+    return curve, lambda scene: bench.objective(scene, act)
 
 
 def learned_linear(bench: Bench, training: Sequence[Scene], configs: int, seed: int) -> tuple[Array, Play]:

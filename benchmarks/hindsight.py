@@ -45,15 +45,7 @@ def best_of_parts(scene: Scene, played: Sequence[Played]) -> Array:
 
 def told(bench: Bench, scene: Scene, residuals: Array) -> float:
     """Returns the objective of an episode that is played by residuals (parts, P) of the defaults, each in its part."""
-    env, ended, k, info = bench.env(scene), False, 0, dict[str, dict[str, float]]()
-    env.reset()
-    columns = [env.space.index(p) for p in bench.space]
-    while not ended:
-        action = np.zeros(len(env.space))
-        action[columns] = residuals[scene.part(EVERY * (k + 0.5))]
-        _, _, ended, _, info = env.step(action)
-        k += 1
-    return info["scores"]["objective"]
+    return bench.objective(scene, lambda k, _: residuals[scene.part(EVERY * (k + 0.5))])
 
 
 def hindsight(name: str, constants: int, seeds: range) -> None:

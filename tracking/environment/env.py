@@ -101,7 +101,8 @@ class TuningEnv(gymnasium.Env[Floats, Any]):
         if not isinstance(cache, SourceCache):
             _check_whole("cache", cache, "bytes, 0 or more, or a SourceCache")
         _check_whole("tracker_seed", tracker_seed, "a whole number, 0 or more")
-        _check_choice("every_score", every_score, (False, True))
+        if not isinstance(every_score, bool):
+            raise InputError(place="every_score", got=repr(every_score), expected="True or False", remedy="correct it")
         self.played: AnyTracker = tracker
         self.tracker = find(tracker.tracker if isinstance(tracker, TimeLimited) else tracker)
         self.decision_every, self.tracker_seed, self.similarity = decision_every, tracker_seed, similarity

@@ -70,7 +70,7 @@ class Likeness:
 
     scenario: Scenario
     people: float
-    measured: bool = True
+    measured: bool
 
     def to_toml(self) -> str:
         """Returns the text of the scenario's file."""

@@ -24,7 +24,7 @@ from tracking.running.policy import Policy
 from tracking.scoring.people import Similarity
 from tracking.stats import FEWEST
 from tracking.tuning.adaptive import Played, play_policy, searched_policy
-from tracking.tuning.candidates import Comparison, HeldOutEvaluator, compare_episodes
+from tracking.tuning.candidates import Comparison, HeldOutEvaluator, compare_episodes, too_few
 from tracking.tuning.search_plan import SearchPlan
 
 
@@ -97,6 +97,8 @@ def adapted(
     """
     report = evaluator.report
     space = online_space(plan)
+    if len(plan.validation) < FEWEST:
+        return Adapted(None, (), f"the constant stays: {too_few(len(plan.validation))}")
     if not training:
         return Adapted(None, (), "the constant stays: no training scene can be played")
     given = plan.detections, plan.options.similarity
@@ -124,9 +126,9 @@ def adapted(
             found = compare_episodes(name, goal, before, after)
             comparisons += [] if found is None else [found]
             if name == "validation" and (found is None or found.verdict != "better"):
-                words = "" if found is None else f": {found.difference_words}, {counted(found.sequences, 'sequence')}"
                 if found is not None and found.indicative:
-                    words += f", fewer than {FEWEST}; give more --validation seeds"
+                    return Adapted(None, tuple(comparisons), f"the constant stays: {too_few(found.sequences)}")
+                words = "" if found is None else f": {found.difference_words}, {counted(found.sequences, 'sequence')}"
                 return Adapted(None, tuple(comparisons), f"the constant stays: no policy is surely better{words}")
     return Adapted(best, tuple(comparisons), "the policy is kept: surely better than the constant in validation")
 

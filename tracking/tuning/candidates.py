@@ -26,7 +26,7 @@ from sim.dataset.generate import LEFT_OUT
 from tracking.config import Config
 from tracking.episodes.episode import Episode, Source
 from tracking.scoring.catalogue import CATALOGUE
-from tracking.stats import few, mean_of_known, paired
+from tracking.stats import FEWEST, few, mean_of_known, paired
 
 if TYPE_CHECKING:
     import optuna
@@ -155,6 +155,12 @@ def compare_episodes(scenes: str, goal: Goal, before: Sequence[Episode], after: 
     return Comparison(
         scenes, goal.key, goal.higher, float(a.mean()), float(b.mean()), difference, low, high, int(known.sum())
     )
+
+
+def too_few(scenes: int) -> str:
+    """Returns why nothing is sure on so few validation scenes, and what helps."""
+    known = f"with {counted(scenes, 'validation scene')}, fewer than {FEWEST}"
+    return f"{known}, no gain is sure; give more --validation seeds"
 
 
 def pareto_front(candidates: Sequence[Candidate], goals: Sequence[Goal]) -> list[Candidate]:

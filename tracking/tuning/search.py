@@ -20,9 +20,8 @@ from scenarios.errors import counted, extra_needed
 from sim.store.own_files import Marks, output_file, refuse_foreign_file
 from sim.types import Tracker
 from tracking.keyword_options import documented
-from tracking.stats import FEWEST
 from tracking.tuning.adaptive_search import adapted, online_space
-from tracking.tuning.candidates import Candidate, Goal, HeldOutEvaluator, TrialRecord, pareto_front
+from tracking.tuning.candidates import Candidate, Goal, HeldOutEvaluator, TrialRecord, pareto_front, too_few
 from tracking.tuning.episode_player import episode_player
 from tracking.tuning.options import Scenes, TuneOptions
 from tracking.tuning.result import TuningResult
@@ -134,8 +133,7 @@ def _why_defaults(candidates: list[Candidate], goal: Goal) -> list[str]:
         return ["the defaults stay: no trial was better in training"]
     best = max(gains, key=lambda c: goal.gain(c.before, c.after))
     if best.indicative:
-        few = f"with {counted(best.sequences, 'validation scene')}, fewer than {FEWEST}, no gain is sure"
-        return [f"the defaults stay: {few}; give more --validation seeds"]
+        return [f"the defaults stay: {too_few(best.sequences)}"]
     ends = f"{best.difference_words}, {counted(best.sequences, 'sequence')}"
     return [f"the defaults stay: nothing is surely better on the validation scenes; at best {goal.key} {ends}"]
 

@@ -94,6 +94,14 @@ def test_what_cannot_be_adapted_is_said_before_anything_is_played(tmp_path: Path
             tune(**tune_arguments(tmp_path, **{"adaptive": 6, **more}))
 
 
+def test_with_few_validation_scenes_no_policy_is_searched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(adaptive_search, "searched_policy", None)
+    found, played = adapted_toy(toy_plan(tmp_path, objective=(), adaptive=6, validation=range(10_000, 10_005)))
+    expected = "with 5 validation scenes, fewer than 6, no gain is sure; give more --validation seeds"
+    assert found == Adapted(None, (), f"the constant stays: {expected}")
+    assert not played
+
+
 def test_the_command_has_the_option(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     one, _ = write_scenes(tmp_path)
     few = ["--seeds", "0:2", "--validation", "10000:10002", "--test", "20000:20001", "--check", "none"]
