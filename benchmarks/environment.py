@@ -10,7 +10,8 @@ Four tables:
 - Random episodes: a tracker, a scene of `quick`, an action space, a reward, a number of frames between decisions, and a
   way to act are drawn, among them corners of the ranges and numbers outside. Observations lie in their space, rewards
   are finite, those of prefixes sum to the objective, those of windows are `tracking.evaluate` of the window times its
-  share (compared in episodes of at most WINDOWS steps).
+  share (compared in episodes of at most WINDOWS steps). An episode is stopped after LONGEST CPU seconds: at some
+  corners of its ranges a tracker keeps whatever was measured, and takes each for a companion of all others.
 - CPU time of a step with a decision in each frame, by fifth of an episode of `street`.
 - CPU time of an episode as a step of the environment, which is how `tune` plays it, beside the same without one.
 """
@@ -18,10 +19,12 @@ Four tables:
 from __future__ import annotations
 
 import pickle
+import signal
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -44,6 +47,7 @@ from benchmarks.peers.environments import DEFAULT, make_environments
 from benchmarks.support.options import add_trackers, new_parser, one_thread
 from benchmarks.support.tables import head, row
 from benchmarks.support.timing import machine_load
+from scenarios.errors import FlockscopeError
 from sim.types import Array
 from tracking.environment.env import Actions, TuningEnv
 from tracking.episodes.episode import Episode, sources
@@ -61,9 +65,14 @@ EVERY, SEEDS = 8, (1, 2)  # frames between decisions; of two episodes
 SCENES, FIRST = "quick", 30_000  # of random episodes; their first seed
 INTERVALS = None, 1, 3, 10, 50, 10_000
 WINDOWS = 12
+LONGEST = 60  # CPU seconds of a random episode
 TIMED, STEPS, PAIRS = ["blob", "group-pda", "SORT"], ("street", [0], ["duration=20"]), 15
 Make = Callable[[], gymnasium.Env[Any, Any]]
 Played = tuple[list[Array], list[float]]
+
+
+class TooLongError(FlockscopeError):
+    """An episode takes too long; what runs the tracker lets it pass."""
 
 
 def actions_of(env: Any, count: int) -> list[Any]:
@@ -210,20 +219,40 @@ def verdict(check: Callable[[Make], None], make: Make) -> str:
 def random_episodes(trackers: tuple[str, ...], count: int, seed: int) -> None:
     """Prints how many random episodes were played, and what was wrong with them."""
     cache = SourceCache(2**30)
-    done, steps, wrong = (Counter[str]() for _ in range(3))
+    done, steps, long, wrong = (Counter[str]() for _ in range(4))
     for k in range(count):
         rng = np.random.default_rng((seed, k))  # so that an episode can be played alone
         tracker = str(rng.choice(trackers))
         try:
-            steps[tracker] += random_episode(tracker, rng, cache)
+            with stopped_after(LONGEST):
+                steps[tracker] += random_episode(tracker, rng, cache)
+        except TooLongError:
+            long[tracker] += 1
+            print(f"episode {k}, {tracker}: stopped", flush=True)
         except Exception as error:  # what fails is the result
             wrong[tracker] += 1
             print(f"episode {k}, {tracker}: {type(error).__name__}: {error}", flush=True)
         done[tracker] += 1
     print(f"\n{count} random episodes, seed {seed}")
-    head(["tracker", "episodes", "steps", "wrong"])
+    head(["tracker", "episodes", "steps", f"stopped after {LONGEST} s", "wrong"])
     for tracker in trackers:
-        row([f"`{tracker}`", *(str(counter[tracker]) for counter in (done, steps, wrong))])
+        row([f"`{tracker}`", *(str(counter[tracker]) for counter in (done, steps, long, wrong))])
+
+
+@contextmanager
+def stopped_after(seconds: float) -> Iterator[None]:
+    """Raises TooLongError in what is done inside after so many CPU seconds."""
+
+    def stop(*_: object) -> None:
+        raise TooLongError(got=f"more than {seconds} CPU seconds", expected="less", remedy="none")
+
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def random_episode(tracker: str, rng: np.random.Generator, cache: SourceCache) -> int:
