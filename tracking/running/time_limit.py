@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import faulthandler
 import itertools
+from collections.abc import Callable
 from typing import Any, Self
 
 from scenarios.errors import InputError
@@ -15,7 +16,6 @@ from scenarios.limits import is_number
 from sim.types import Context, Detections, Frame, Tracker, Tracks
 from tracking.config import Config
 from tracking.running import tracker_registry, used_files
-from tracking.running.image_scale import learned_by
 from tracking.running.used_files import inside, owner_of
 
 GRACE = 5.0  # s after the limit at which a process ends itself, should its parent be gone.
@@ -74,11 +74,12 @@ class TimeLimited:
         return made
 
     def call(self, number: int, method: str, *arguments: Any) -> Any:
-        """Calls "create", "reset" or "step" of the tracker with this number in the process; returns the result.
+        """Makes the tracker with this number in the process ("create"), or calls its "reset" or "step", or "getattr" or
+        "setattr" with it; returns the result.
 
-        "create" has no time limit and returns None. "reset" and "step" return the method's result, the tracker's
-        px_per_m, and what is new of that which it has used. Raises TimeoutError if the limit is exceeded,
-        ChildProcessError if the process has ended, or what the tracker raised.
+        "create" has no time limit and returns whether the tracker keeps a config. The others return the result, the
+        attributes TOLD that the tracker has, and what is new of that which it has used. Raises TimeoutError if the
+        limit is exceeded, ChildProcessError if the process has ended, or what the tracker raised.
         """
         from sim.workers.calls import RemoteTraceback
 
@@ -96,34 +97,64 @@ class TimeLimited:
 
 
 class RemoteTracker:
-    """Stands for a tracker in the process of a TimeLimited, with its attributes needs, config and px_per_m."""
+    """Stands for a tracker in the process of a TimeLimited: its other attributes are those of the tracker there, as
+    long as the process holds it.
+
+    State: the config; whether the tracker is still to be given it; the attributes TOLD after the last call.
+    """
 
     def __init__(self, host: TimeLimited, number: int, config: Config | None) -> None:
-        self.needs, self.config = host.needs, config
-        self.px_per_m = float("nan")
-        self._host, self._number = host, number
+        self.needs, self._config, self._changed, self._keeps = host.needs, config, False, False
+        self._host, self._number, self._told = host, number, dict[str, Any]()
 
     def create(self) -> None:
         """Makes the tracker in the process, unless the process holds it already."""
-        values = None if self.config is None else self.config.as_dict()
-        self._host.call(self._number, "create", self._host.tracker, values)
+        values = None if self._config is None else self._config.as_dict()
+        self._keeps = self._host.call(self._number, "create", self._host.tracker, values)
+
+    @property
+    def config(self) -> Config | None:
+        """The tracker's config, which may be replaced between two steps. Raises AttributeError if it keeps none."""
+        if not self._keeps:
+            raise AttributeError("config")
+        return self._config
+
+    @config.setter
+    def config(self, config: Config) -> None:
+        self._config, self._changed = config, True
+
+    def __getattr__(self, name: str) -> Any:
+        if name in TOLD and name in self._told:
+            return self._told[name]
+        if name in TOLD or name.startswith("_"):
+            raise AttributeError(name)
+        return self._call("getattr", name)
 
     def reset(self, context: Context, seed: int) -> None:
         """Resets the tracker; if its process has ended, the tracker is made again before."""
         self.create()
+        self._send_config()
         self._call("reset", context, seed)
 
     def step(self, frame: Frame, detections: Detections | None) -> Tracks:
         """Returns the tracker's tracks of the frame, with these detections."""
+        self._send_config()
         return self._call("step", frame, detections)  # type: ignore[no-any-return]
 
+    def _send_config(self) -> None:
+        if self._changed and self._config is not None:
+            self._call("setattr", "config", self._config.as_dict())
+            self._changed = False
+
     def _call(self, method: str, *arguments: Any) -> Any:
-        result, self.px_per_m, used = self._host.call(self._number, method, *arguments)
+        result, self._told, used = self._host.call(self._number, method, *arguments)
         if used:
             used_files.note(tracker_registry.find(self._host.tracker), used)
         return result
 
 
+TOLD = ("px_per_m", "camera_moves")  # attributes that are known without asking, when the process has ended, too
+ATTRIBUTES: dict[str, Callable[..., Any]] = {"getattr": getattr, "setattr": setattr}
 _sent = (-1, 0)  # In the process: what was known when `used` was sent last.
 _made: dict[int, Tracker] = {}  # In the process: the tracker by its number; at most one.
 
@@ -139,15 +170,21 @@ def _call(request: tuple[int, str, tuple[Any, ...], float]) -> Any:
                 made = found() if values is None else found(found.config_class.from_dict(values))
             _made.clear()
             _made[number] = made
-        return None
+        return hasattr(_made[number], "config")
     if number not in _made:
+        if method == "getattr":
+            raise AttributeError(*given)
         raise RuntimeError("the process of this tracker was started again since its reset")
     faulthandler.dump_traceback_later(limit, exit=True)  # ends the process, also in compiled code
-    tracker = type(_made[number])
+    made = _made[number]
+    tracker: Any = type(made)
+    if method == "setattr":
+        given = given[0], tracker.config_class.from_dict(given[1])
     try:
         with inside(owner_of(tracker.__module__)):
-            result, learned = getattr(_made[number], method)(*given), learned_by(_made[number])
+            result = ATTRIBUTES[method](made, *given) if method in ATTRIBUTES else getattr(made, method)(*given)
+            told = {name: getattr(made, name) for name in TOLD if hasattr(made, name)}
     finally:
         faulthandler.cancel_dump_traceback_later()
     before, _sent = _sent, (number, used_files.opened())
-    return result, learned, {} if _sent == before else used_files.used(tracker)
+    return result, told, {} if _sent == before else used_files.used(tracker)

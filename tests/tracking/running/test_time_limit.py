@@ -12,6 +12,7 @@ from scenarios.loading.resolve import load
 from sim.sequence import simulate
 from sim.types import Detections, Frame, Sequence
 from tracking.app.cli import run
+from tracking.running import tracker_registry
 from tracking.running.run import track
 from tracking.running.time_limit import TimeLimited
 
@@ -40,6 +41,8 @@ class Tracker:
     config_class = Settings
     needs = ("points", "boxes")
     px_per_m = np.float32(21)
+    diagnostics = {"ways": list(WAYS)}
+    camera_moves = property(lambda self: self.config.reach > 1.0)
     def __init__(self, config):
         self.config = config
     def reset(self, context, seed):
@@ -113,6 +116,32 @@ def test_the_answers_are_those_of_the_tracker_in_this_process(mine):
         assert {k: v for k, v in here.info.items() if "frames_per" not in k} == {
             k: v for k, v in there.info.items() if "frames_per" not in k
         }
+
+
+def test_attributes_are_those_of_the_tracker_in_the_process(mine):
+    with TimeLimited(mine, 60.0) as limited:
+        other = tracker_registry.find(mine)
+        made = limited.make(other.config_class())
+        made.reset(None, 0)
+        assert made.diagnostics == other.diagnostics
+        assert made.px_per_m == 21
+        assert not hasattr(made, "walking_together")
+        assert not made.camera_moves
+        made.config = other.config_class(reach=1.5)
+        made.reset(None, 0)
+        assert made.camera_moves
+        assert made.config.reach == 1.5
+        limited.close()
+        assert made.px_per_m == 21
+        assert not hasattr(made, "diagnostics")
+        assert "diagnostics" in track(limited, five_frames()).info
+
+
+def test_a_tracker_without_a_config_keeps_none(tmp_path):
+    (tmp_path / "plain.py").write_text(TRACKER.replace("self.config = config", "self.settings = config"))
+    name = f"{tmp_path / 'plain.py'}:Tracker"
+    with TimeLimited(name, 60.0) as limited:
+        assert not hasattr(limited.make(tracker_registry.find(name).config_class()), "config")
 
 
 def test_no_process_is_left(mine):
