@@ -19,12 +19,10 @@ Four tables:
 from __future__ import annotations
 
 import pickle
-import signal
 import time
 import warnings
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -46,7 +44,7 @@ from benchmarks.peers.adapters import PEERS
 from benchmarks.peers.environments import DEFAULT, make_environments
 from benchmarks.support.options import add_trackers, new_parser, one_thread
 from benchmarks.support.tables import head, row
-from benchmarks.support.timing import machine_load
+from benchmarks.support.timing import machine_load, stopped_after
 from scenarios.errors import FlockscopeError
 from sim.types import Array
 from tracking.environment.env import Actions, TuningEnv
@@ -219,12 +217,13 @@ def verdict(check: Callable[[Make], None], make: Make) -> str:
 def random_episodes(trackers: tuple[str, ...], count: int, seed: int) -> None:
     """Prints how many random episodes were played, and what was wrong with them."""
     cache = SourceCache(2**30)
+    overtime = TooLongError(got=f"more than {LONGEST} CPU seconds", expected="less", remedy="none")
     done, steps, long, wrong = (Counter[str]() for _ in range(4))
     for k in range(count):
         rng = np.random.default_rng((seed, k))  # so that an episode can be played alone
         tracker = str(rng.choice(trackers))
         try:
-            with stopped_after(LONGEST):
+            with stopped_after(LONGEST, overtime):
                 steps[tracker] += random_episode(tracker, rng, cache)
         except TooLongError:
             long[tracker] += 1
@@ -237,22 +236,6 @@ def random_episodes(trackers: tuple[str, ...], count: int, seed: int) -> None:
     head(["tracker", "episodes", "steps", f"stopped after {LONGEST} s", "wrong"])
     for tracker in trackers:
         row([f"`{tracker}`", *(str(counter[tracker]) for counter in (done, steps, long, wrong))])
-
-
-@contextmanager
-def stopped_after(seconds: float) -> Iterator[None]:
-    """Raises TooLongError in what is done inside after so many CPU seconds."""
-
-    def stop(*_: object) -> None:
-        raise TooLongError(got=f"more than {seconds} CPU seconds", expected="less", remedy="none")
-
-    before = signal.signal(signal.SIGPROF, stop)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
-    try:
-        yield
-    finally:
-        signal.setitimer(signal.ITIMER_PROF, 0)
-        signal.signal(signal.SIGPROF, before)
 
 
 def random_episode(tracker: str, rng: np.random.Generator, cache: SourceCache) -> int:

@@ -1,10 +1,12 @@
-"""Clocks of the benchmarks: the best CPU or wall time of several runs, and the load of the machine."""
+"""Clocks of the benchmarks: the best CPU or wall time of several runs, the load of the machine, and a time limit."""
 
 from __future__ import annotations
 
 import os
+import signal
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 
 import numpy as np
 
@@ -12,6 +14,22 @@ import numpy as np
 def machine_load() -> str:
     """Returns the load average of the last minute and the number of cores, for the head of a table."""
     return f"load {os.getloadavg()[0]:.1f} on {os.cpu_count()} cores"
+
+
+@contextmanager
+def stopped_after(seconds: float, error: BaseException) -> Iterator[None]:
+    """Raises an error in what is done inside after so many CPU seconds of this process."""
+
+    def ring(*_: object) -> None:
+        raise error
+
+    before = signal.signal(signal.SIGPROF, ring)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def best_times(work: Callable[[], object], rounds: int) -> tuple[float, float]:

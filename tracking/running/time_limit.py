@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import faulthandler
 import itertools
-from collections.abc import Callable
 from typing import Any, Self
 
 from scenarios.errors import InputError
@@ -16,6 +15,7 @@ from scenarios.limits import is_number
 from sim.types import Context, Detections, Frame, Tracker, Tracks
 from tracking.config import Config
 from tracking.running import tracker_registry, used_files
+from tracking.running.image_scale import learned_by
 from tracking.running.used_files import inside, owner_of
 
 GRACE = 5.0  # s after the limit at which a process ends itself, should its parent be gone.
@@ -74,12 +74,12 @@ class TimeLimited:
         return made
 
     def call(self, number: int, method: str, *arguments: Any) -> Any:
-        """Makes the tracker with this number in the process ("create"), or calls its "reset" or "step", or "getattr" or
-        "setattr" with it; returns the result.
+        """Makes the tracker with this number in the process ("create"), replaces its config ("configure"), asks for an
+        attribute ("getattr"), or calls its "reset" or "step"; returns the result.
 
         "create" has no time limit and returns whether the tracker keeps a config. The others return the result, the
-        attributes TOLD that the tracker has, and what is new of that which it has used. Raises TimeoutError if the
-        limit is exceeded, ChildProcessError if the process has ended, or what the tracker raised.
+        tracker's px_per_m, whether it says that the camera moves, and what is new of that which it has used. Raises
+        TimeoutError if the limit is exceeded, ChildProcessError if the process has ended, or what the tracker raised.
         """
         from sim.workers.calls import RemoteTraceback
 
@@ -97,15 +97,18 @@ class TimeLimited:
 
 
 class RemoteTracker:
-    """Stands for a tracker in the process of a TimeLimited: its other attributes are those of the tracker there, as
-    long as the process holds it.
+    """Stands for a tracker in the process of a TimeLimited, with its attributes needs, config, px_per_m and
+    camera_moves; others are asked for there, as long as the process holds the tracker.
 
-    State: the config; whether the tracker is still to be given it; the attributes TOLD after the last call.
+    State: the config, and that which the tracker is still to be given, None if it has it; whether it keeps one; its
+    px_per_m and camera_moves after the last call.
     """
 
     def __init__(self, host: TimeLimited, number: int, config: Config | None) -> None:
-        self.needs, self._config, self._changed, self._keeps = host.needs, config, False, False
-        self._host, self._number, self._told = host, number, dict[str, Any]()
+        self.needs, self._config, self._keeps = host.needs, config, False
+        self._waiting: Config | None = None
+        self.px_per_m, self.camera_moves = float("nan"), False
+        self._host, self._number = host, number
 
     def create(self) -> None:
         """Makes the tracker in the process, unless the process holds it already."""
@@ -121,12 +124,10 @@ class RemoteTracker:
 
     @config.setter
     def config(self, config: Config) -> None:
-        self._config, self._changed = config, True
+        self._config = self._waiting = config
 
     def __getattr__(self, name: str) -> Any:
-        if name in TOLD and name in self._told:
-            return self._told[name]
-        if name in TOLD or name.startswith("_"):
+        if name.startswith("_"):
             raise AttributeError(name)
         return self._call("getattr", name)
 
@@ -142,21 +143,19 @@ class RemoteTracker:
         return self._call("step", frame, detections)  # type: ignore[no-any-return]
 
     def _send_config(self) -> None:
-        if self._changed and self._config is not None:
-            self._call("setattr", "config", self._config.as_dict())
-            self._changed = False
+        if self._waiting is not None:
+            self._call("configure", self._waiting.as_dict())
+            self._waiting = None
 
     def _call(self, method: str, *arguments: Any) -> Any:
-        result, self._told, used = self._host.call(self._number, method, *arguments)
+        result, self.px_per_m, self.camera_moves, used = self._host.call(self._number, method, *arguments)
         if used:
             used_files.note(tracker_registry.find(self._host.tracker), used)
         return result
 
 
-TOLD = ("px_per_m", "camera_moves")  # attributes that are known without asking, when the process has ended, too
-ATTRIBUTES: dict[str, Callable[..., Any]] = {"getattr": getattr, "setattr": setattr}
 _sent = (-1, 0)  # In the process: what was known when `used` was sent last.
-_made: dict[int, Tracker] = {}  # In the process: the tracker by its number; at most one.
+_made: dict[int, Any] = {}  # In the process: the tracker by its number; at most one.
 
 
 def _call(request: tuple[int, str, tuple[Any, ...], float]) -> Any:
@@ -177,14 +176,17 @@ def _call(request: tuple[int, str, tuple[Any, ...], float]) -> Any:
         raise RuntimeError("the process of this tracker was started again since its reset")
     faulthandler.dump_traceback_later(limit, exit=True)  # ends the process, also in compiled code
     made = _made[number]
-    tracker: Any = type(made)
-    if method == "setattr":
-        given = given[0], tracker.config_class.from_dict(given[1])
+    tracker, result = type(made), None
     try:
         with inside(owner_of(tracker.__module__)):
-            result = ATTRIBUTES[method](made, *given) if method in ATTRIBUTES else getattr(made, method)(*given)
-            told = {name: getattr(made, name) for name in TOLD if hasattr(made, name)}
+            if method == "configure":
+                made.config = tracker.config_class.from_dict(*given)
+            elif method == "getattr":
+                result = getattr(made, *given)
+            else:
+                result = getattr(made, method)(*given)
+            told = learned_by(made), bool(getattr(made, "camera_moves", False))
     finally:
         faulthandler.cancel_dump_traceback_later()
     before, _sent = _sent, (number, used_files.opened())
-    return result, told, {} if _sent == before else used_files.used(tracker)
+    return result, *told, {} if _sent == before else used_files.used(tracker)

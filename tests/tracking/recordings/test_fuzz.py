@@ -3,7 +3,6 @@
 import json
 import resource
 import shutil
-import signal
 import tempfile
 import warnings
 from contextlib import contextmanager, suppress
@@ -14,6 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from benchmarks.support.timing import stopped_after
 from scenarios.errors import FlockscopeError
 from sim import hashing
 from sim.store.seal import with_hash
@@ -38,20 +38,13 @@ class Overtime(BaseException):
 @contextmanager
 def bounded(seconds=20.0, memory=4 * 2**30):
     """Raises Overtime after `seconds` of CPU time, MemoryError beyond `memory` more bytes."""
-
-    def ring(*_):
-        raise Overtime(f"more than {seconds:g} s")
-
     limits = resource.getrlimit(resource.RLIMIT_AS)
     pages = int(Path("/proc/self/statm").read_text().split()[0])
-    before = signal.signal(signal.SIGPROF, ring)
     resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + memory, limits[1]))
-    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
-        yield
+        with stopped_after(seconds, Overtime(f"more than {seconds:g} s")):
+            yield
     finally:
-        signal.setitimer(signal.ITIMER_PROF, 0)
-        signal.signal(signal.SIGPROF, before)
         resource.setrlimit(resource.RLIMIT_AS, limits)
 
 
